@@ -1,0 +1,38 @@
+"""Every channel that we write or read by name, once."""
+
+from toolkit.messages.annotations import ImageAnnotations
+from toolkit.messages.detections import Detections
+from toolkit.messages.images import CameraInfo, CompressedImage
+from toolkit.messages.markers import MarkerArray
+from toolkit.messages.match import LandmarkMatch
+from toolkit.messages.poses import Odometry, Path, PoseStamped, PoseWithCovarianceStamped
+from toolkit.messages.scan import LaserScan
+from toolkit.messages.scene import SceneObjects
+from toolkit.messages.transforms import TFMessage
+from toolkit.stage import Channel
+
+CAMERA_IMAGE = Channel("/camera/image_raw/compressed", CompressedImage)
+CAMERA_INFO = Channel("/camera/camera_info", CameraInfo)
+SCAN = Channel("/scan", LaserScan)
+ODOMETRY = Channel("/odom", Odometry)
+TF = Channel("/tf", TFMessage)
+TF_STATIC = Channel("/tf_static", TFMessage)
+
+DETECTIONS = Channel("/landmarks/detections", Detections)
+ANNOTATIONS = Channel("/camera/annotations", ImageAnnotations)
+SCENE_OBJECTS = Channel("/landmarks/scene_objects", SceneObjects)
+
+MAP_MARKERS = Channel("/landmarks/map_markers", MarkerArray)
+MAP_PATH = Channel("/landmarks/map_path", Path)
+MAP_POSE = Channel("/landmarks/map_pose", PoseStamped)
+
+MAP = Channel("/landmarks/map", SceneObjects)
+MATCH = Channel("/landmarks/match", LandmarkMatch)
+POSE = Channel("/landmarks/pose", PoseStamped)
+POSE_COVARIANCE = Channel("/landmarks/pose_cov", PoseWithCovarianceStamped)
+
+TRUTH_POSE = Channel("/ground_truth/pose", PoseStamped)
+TRUTH_OBJECTS = Channel("/ground_truth/objects", SceneObjects)
+TRUTH_DETECTIONS = Channel("/ground_truth/detections", Detections)
+
+MAP_FRAME, ODOM_FRAME, BASE_FRAME = "map", "odom", "base_footprint"

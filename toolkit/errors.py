@@ -1,0 +1,25 @@
+"""The one error tree: every message says what was wrong, where, and what to do about it."""
+
+
+class ToolkitError(Exception):
+    """Something the user can act on. The command line prints it in one line and exits with `exit_code`."""
+
+    exit_code = 1
+
+
+class UsageError(ToolkitError):
+    """The command was asked for something that makes no sense: wrong option, ambiguous topic, missing input."""
+
+    exit_code = 2
+
+
+class RecordingError(ToolkitError):
+    """A recording, bag or data set cannot be read or written."""
+
+
+class MessageError(ToolkitError):
+    """The bytes of one message do not fit its declared type."""
+
+
+class MapError(ToolkitError):
+    """A landmark database is missing, damaged, of another schema version, or too poor to use."""

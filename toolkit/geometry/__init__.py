@@ -1,0 +1,1 @@
+"""Angles and rigid transforms of the plane."""

@@ -1,0 +1,1 @@
+"""ROS messages as frozen dataclasses of numpy arrays, to and from CDR."""

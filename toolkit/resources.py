@@ -1,0 +1,22 @@
+"""Finds the files that travel with the code (schemas, demo recordings), in a wheel and in a checkout."""
+
+from pathlib import Path
+
+from toolkit.errors import ToolkitError
+
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def resource(folder: str, name: str) -> Path:
+    """Path of `folder/name`, where folder is `schemas` or `recordings`.
+
+    A wheel carries these folders inside the package (`toolkit/data`), a checkout beside it.
+
+    Raises:
+        ToolkitError: the file is in neither place.
+    """
+    for root in (_PACKAGE / "data", _PACKAGE.parent):
+        path = root / folder / name
+        if path.exists():
+            return path
+    raise ToolkitError(f"{folder}/{name} is missing from the installation; reinstall mcap-landmarks")

@@ -1,0 +1,90 @@
+"""The words that runs, stages and sources share: raw messages, channels, bundles, stages."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic
+
+from toolkit.geometry.se2 import Array
+from toolkit.messages.codec import M, Message
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """Where raw messages come from or go to: one channel of a recording, with the schema of its messages.
+
+    `message_type` is the ROS 2 name (`nav_msgs/msg/Odometry`), `schema` the text of its definition.
+    """
+
+    topic: str
+    message_type: str
+    schema: bytes
+    schema_encoding: str = "ros2msg"
+    message_encoding: str = "cdr"
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RawMessage:
+    """One message as it lies in a recording."""
+
+    connection: Connection
+    log_time_ns: int
+    publish_time_ns: int
+    sequence: int
+    data: bytes | memoryview
+
+
+@dataclass(frozen=True, slots=True)
+class Channel(Generic[M]):
+    """A topic and the dataclass of its messages."""
+
+    topic: str
+    message: type[M]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stamped:
+    """A message on its way into a recording."""
+
+    channel: Channel[Any]
+    log_time_ns: int
+    message: Message
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bundle:
+    """What belongs to one moment: the messages associated with it, by channel, and the odometry at its stamp.
+
+    odom_from_base (3,) is x, y, heading interpolated at `stamp_ns`, None where the log has none then.
+    """
+
+    stamp_ns: int
+    log_time_ns: int
+    messages: Mapping[Channel[Any], Message]
+    odom_from_base: Array | None = None
+
+    def get(self, channel: Channel[M]) -> M | None:
+        """The bundle's message of a channel, None if it has none."""
+        message = self.messages.get(channel)
+        return message if isinstance(message, channel.message) else None
+
+
+Process = Callable[[Iterable[Bundle], Any, Mapping[str, Path]], Iterator[Stamped]]
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One step of the pipeline: what it reads and writes, its configuration and its code.
+
+    `config` is a dataclass type; `resources` are files that the runner opens, hashes and passes in; `tolerance` says
+    how far each field may differ between two machines.
+    """
+
+    name: str
+    reads: tuple[Channel[Any], ...]
+    writes: tuple[Channel[Any], ...]
+    config: type[Any]
+    process: Process
+    resources: tuple[str, ...] = ()
+    tolerance: Mapping[str, float] = field(default_factory=dict)
