@@ -9,11 +9,12 @@ from toolkit.geometry.se2 import Array
 from toolkit.messages.codec import M, Message
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Connection:
     """Where raw messages come from or go to: one channel of a recording, with the schema of its messages.
 
-    `message_type` is the ROS 2 name (`nav_msgs/msg/Odometry`), `schema` the text of its definition.
+    `message_type` is the ROS 2 name (`nav_msgs/msg/Odometry`), `schema` the text of its definition. Two connections
+    are equal only if they are the same object: a recording may have several with the same topic.
     """
 
     topic: str

@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 def wrap(angle_rad: ArrayLike) -> NDArray[np.float64]:
     """Bring angles of any shape into [-pi, pi)."""
     angle: NDArray[np.float64] = np.asarray(angle_rad, dtype=np.float64)
-    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
+    wrapped: NDArray[np.float64] = (angle + np.pi) % (2 * np.pi) - np.pi
+    return wrapped
 
 
 def yaw_from_quaternion(quaternion_xyzw: ArrayLike) -> NDArray[np.float64]:
