@@ -1,0 +1,1 @@
+"""Simulated recordings with known truth: worlds, sensors, robot, and the detector's training set."""

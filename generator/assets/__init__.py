@@ -1,0 +1,1 @@
+"""Procedural objects, grounds and skies of the simulated worlds."""

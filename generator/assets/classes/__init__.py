@@ -1,0 +1,1 @@
+"""The COCO classes, one module each; every module declares its `CLASS`."""
