@@ -6,15 +6,14 @@ from numpy.typing import ArrayLike, NDArray
 
 def wrap(angle_rad: ArrayLike) -> NDArray[np.float64]:
     """Bring angles of any shape into [-pi, pi)."""
-    angle: NDArray[np.float64] = np.asarray(angle_rad, dtype=np.float64)
-    wrapped: NDArray[np.float64] = (angle + np.pi) % (2 * np.pi) - np.pi
-    return wrapped
+    return (np.asarray(angle_rad, dtype=np.float64) + np.pi) % (2 * np.pi) - np.pi
 
 
 def yaw_from_quaternion(quaternion_xyzw: ArrayLike) -> NDArray[np.float64]:
     """Rotation about z (...,) of quaternions (..., 4), which need not be normalised."""
     x, y, z, w = np.moveaxis(np.asarray(quaternion_xyzw, dtype=np.float64), -1, 0)
-    return np.arctan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
+    yaw: NDArray[np.float64] = np.arctan2(2 * (w * z + x * y), w * w + x * x - y * y - z * z)
+    return yaw
 
 
 def quaternion_from_yaw(yaw_rad: ArrayLike) -> NDArray[np.float64]:

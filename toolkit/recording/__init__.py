@@ -1,0 +1,1 @@
+"""The MCAP container: the only package that knows its bytes."""

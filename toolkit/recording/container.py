@@ -1,0 +1,57 @@
+"""The bytes of MCAP that the hot paths read and write themselves; everything else is left to mcap.records."""
+
+from io import BytesIO
+from struct import Struct
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.opcode import Opcode
+from mcap.records import McapRecord
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+MAGIC = b"\x89MCAP0\r\n"
+RECORD = Struct("<BQ")  # opcode, length
+MESSAGE = Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
+MESSAGE_FIXED = MESSAGE.size - RECORD.size
+CHUNK = Struct("<QQQI")  # first and last log time, uncompressed size, uncompressed crc
+FOOTER_SIZE = RECORD.size + 20
+LARGEST_CHUNK = 1 << 30
+"""A chunk that claims to be larger than this is taken for damage, and not allocated."""
+
+R = TypeVar("R")
+
+
+class Readable(Protocol[R]):
+    """A record class of mcap.records."""
+
+    read: "Callable[[ReadDataStream], R]"
+
+
+def parse(record: Readable[R], content: bytes | memoryview) -> R:
+    """Record of a class of mcap.records from its content, the bytes after opcode and length."""
+    return record.read(ReadDataStream(BytesIO(content)))
+
+
+def serialize(*records: McapRecord) -> bytes:
+    """Bytes of whole records, opcode and length included."""
+    builder = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    data: bytes = builder.end()  # type: ignore[no-untyped-call] # mcap does not type it
+    return bytes(data)
+
+
+__all__ = [
+    "CHUNK",
+    "FOOTER_SIZE",
+    "LARGEST_CHUNK",
+    "MAGIC",
+    "MESSAGE",
+    "MESSAGE_FIXED",
+    "RECORD",
+    "Opcode",
+    "parse",
+    "serialize",
+]

@@ -1,0 +1,233 @@
+"""Write recordings: chunked, indexed, checksummed, and whole or not at all."""
+
+import contextlib
+import zlib
+from array import array
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from mcap import records
+from zstandard import ZstdCompressor
+
+from toolkit.errors import RecordingError
+from toolkit.messages.codec import encode
+from toolkit.messages.qos import KEY, qos_profile
+from toolkit.messages.typestore import definition
+from toolkit.atomic import atomic_file
+from toolkit.recording.container import MAGIC, MESSAGE, MESSAGE_FIXED, Opcode, serialize
+from toolkit.recording.summary import summary_section
+from toolkit.stage import Channel, Connection, RawMessage, Stamped
+
+CHUNK_BYTES = 1 << 20
+CHUNK_NS = 5 * 10**9
+_IMAGE_TYPES = frozenset({"sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"})
+_LATCHED = frozenset({"/tf_static", "/landmarks/map", "/ground_truth/objects"})
+
+
+@contextlib.contextmanager
+def create_recording(
+    path: Path, metadata: Mapping[str, Mapping[str, str]] | None = None
+) -> Iterator["RecordingWriter"]:
+    """A writer whose file takes the name `path` when the block ends well and vanishes when it does not.
+
+    Raises:
+        UsageError, RecordingError: the file cannot be written; nothing is left behind.
+    """
+    with atomic_file(path) as stream:
+        writer = RecordingWriter(stream)
+        for name, entries in (metadata or {}).items():
+            writer.metadata[name] = dict(entries)
+        yield writer
+        writer.finish()
+
+
+@dataclass(slots=True)
+class _Chunk:
+    """Messages on their way into one chunk of the file."""
+
+    compressed: bool
+    data: bytearray = field(default_factory=bytearray)
+    start_ns: int = 2**64 - 1
+    end_ns: int = 0
+    index: "dict[int, array[int]]" = field(default_factory=dict)
+
+
+class RecordingWriter:
+    """Writes one recording to a stream; made by `create_recording`.
+
+    Every image channel gets uncompressed chunks of its own; the others share zstd chunks with their `group`, so that
+    results of one stage lie together. A chunk ends after 1 MiB or 5 s. What `metadata` holds when the file is finished
+    goes into it, one record per name.
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.counts: dict[str, int] = {}
+        self._stream = stream
+        self._offset = self._crc = 0
+        self._connections: dict[Connection, tuple[int, str]] = {}
+        self._own: dict[str, Connection] = {}
+        self._schemas: dict[tuple[str, str, bytes], records.Schema] = {}
+        self._channels: list[records.Channel] = []
+        self._message_counts: dict[int, int] = {}
+        self._chunks: dict[str, _Chunk] = {}
+        self._chunk_indexes: list[records.ChunkIndex] = []
+        self._attachments: list[records.AttachmentIndex] = []
+        self._compressor = ZstdCompressor(level=3)
+        self._put(MAGIC + serialize(records.Header(profile="ros2", library="mcap-landmarks")))
+
+    def declare(self, connection: Connection, group: str = "") -> None:
+        """Give a connection its channel, also if no message of it comes."""
+        if connection in self._connections:
+            return
+        schema_id = 0
+        if connection.message_type:
+            key = (connection.message_type, connection.schema_encoding, connection.schema)
+            if key not in self._schemas:
+                schema = records.Schema(len(self._schemas) + 1, key[2], key[1], key[0])
+                self._schemas[key] = schema
+                self._put(serialize(schema))
+            schema_id = self._schemas[key].id
+        channel = records.Channel(
+            id=len(self._channels) + 1,
+            topic=connection.topic,
+            message_encoding=connection.message_encoding,
+            metadata=dict(connection.metadata),
+            schema_id=schema_id,
+        )
+        if channel.id > 0xFFFF:
+            raise RecordingError(f"{connection.topic} is channel {channel.id}; MCAP holds 65535: choose topics")
+        self._put(serialize(channel))
+        self._channels.append(channel)
+        self._message_counts[channel.id] = 0
+        self.counts.setdefault(connection.topic, 0)
+        group = f"image {channel.id}" if connection.message_type in _IMAGE_TYPES else group
+        self._connections[connection] = (channel.id, group)
+
+    def write(self, raw: RawMessage, group: str = "") -> None:
+        """Write a message as it is, on the channel of its connection."""
+        if raw.connection not in self._connections:
+            self.declare(raw.connection, group)
+        channel_id, group = self._connections[raw.connection]
+        chunk = self._chunks.get(group)
+        if chunk is None:
+            chunk = self._chunks[group] = _Chunk(compressed=not group.startswith("image "))
+        time_ns, size = raw.log_time_ns, len(raw.data)
+        entries = chunk.index.get(channel_id)
+        if entries is None:
+            entries = chunk.index[channel_id] = array("Q")
+        entries.extend((time_ns, len(chunk.data)))
+        chunk.data += MESSAGE.pack(
+            Opcode.MESSAGE, MESSAGE_FIXED + size, channel_id, raw.sequence, time_ns, raw.publish_time_ns
+        )
+        chunk.data += raw.data
+        chunk.start_ns = min(chunk.start_ns, time_ns)
+        chunk.end_ns = max(chunk.end_ns, time_ns)
+        self._message_counts[channel_id] += 1
+        self.counts[raw.connection.topic] += 1
+        if len(chunk.data) >= CHUNK_BYTES or chunk.end_ns - chunk.start_ns >= CHUNK_NS:
+            self._flush(self._chunks.pop(group))
+
+    def add(self, stamped: Stamped, group: str = "") -> None:
+        """Encode a message of ours and write it; it is published when it is logged."""
+        connection = self.connection(stamped.channel)
+        sequence = self.counts.get(connection.topic, 0)
+        time_ns = stamped.log_time_ns
+        self.write(RawMessage(connection, time_ns, time_ns, sequence, encode(stamped.message)), group)
+
+    def connection(self, channel: Channel[Any]) -> Connection:
+        """The connection that messages of a channel of ours go to."""
+        if channel.topic not in self._own:
+            ros_type = channel.message.ROS_TYPE
+            qos = qos_profile(latched=channel.topic in _LATCHED)
+            self._own[channel.topic] = Connection(
+                channel.topic, ros_type, definition(ros_type).encode(), metadata={KEY: qos}
+            )
+        return self._own[channel.topic]
+
+    def attach(self, attachment: records.Attachment) -> None:
+        """Carry an attachment over from another recording."""
+        data = serialize(attachment)
+        self._attachments.append(
+            records.AttachmentIndex(
+                offset=self._offset,
+                length=len(data),
+                log_time=attachment.log_time,
+                create_time=attachment.create_time,
+                data_size=len(attachment.data),
+                name=attachment.name,
+                media_type=attachment.media_type,
+            )
+        )
+        self._put(data)
+
+    def finish(self) -> None:
+        """Write what is left, the metadata and the summary; afterwards the file is complete."""
+        for group in sorted(self._chunks, key=lambda name: self._chunks[name].start_ns):
+            self._flush(self._chunks[group])
+        metadata_indexes = []
+        for name, entries in sorted(self.metadata.items()):
+            data = serialize(records.Metadata(name=name, metadata=dict(sorted(entries.items()))))
+            metadata_indexes.append(records.MetadataIndex(length=len(data), name=name, offset=self._offset))
+            self._put(data)
+        self._put(serialize(records.DataEnd(data_section_crc=self._crc)))
+        starts = [index.message_start_time for index in self._chunk_indexes]
+        ends = [index.message_end_time for index in self._chunk_indexes]
+        statistics = records.Statistics(
+            message_count=sum(self._message_counts.values()),
+            schema_count=len(self._schemas),
+            channel_count=len(self._channels),
+            attachment_count=len(self._attachments),
+            metadata_count=len(metadata_indexes),
+            chunk_count=len(self._chunk_indexes),
+            message_start_time=min(starts, default=0),
+            message_end_time=max(ends, default=0),
+            channel_message_counts={key: count for key, count in self._message_counts.items() if count},
+        )
+        groups: list[list[records.McapRecord]] = [
+            list(self._schemas.values()),
+            list(self._channels),
+            [statistics],
+            list(self._chunk_indexes),
+            list(self._attachments),
+            list(metadata_indexes),
+        ]
+        self._stream.write(summary_section(groups, self._offset))
+
+    def _flush(self, chunk: _Chunk) -> None:
+        content = self._compressor.compress(bytes(chunk.data)) if chunk.compressed else bytes(chunk.data)
+        record = records.Chunk(
+            compression="zstd" if chunk.compressed else "",
+            data=content,
+            message_start_time=chunk.start_ns,
+            message_end_time=chunk.end_ns,
+            uncompressed_crc=zlib.crc32(chunk.data),
+            uncompressed_size=len(chunk.data),
+        )
+        start = self._offset
+        self._put(serialize(record))
+        length, offsets = self._offset - start, {}
+        for channel_id, entries in sorted(chunk.index.items()):
+            offsets[channel_id] = self._offset
+            pairs = list(zip(entries[::2], entries[1::2], strict=True))
+            self._put(serialize(records.MessageIndex(channel_id=channel_id, records=pairs)))
+        self._chunk_indexes.append(
+            records.ChunkIndex(
+                chunk_length=length,
+                chunk_start_offset=start,
+                compression=record.compression,
+                compressed_size=len(content),
+                message_end_time=chunk.end_ns,
+                message_index_length=self._offset - start - length,
+                message_index_offsets=offsets,
+                message_start_time=chunk.start_ns,
+                uncompressed_size=len(chunk.data),
+            )
+        )
+
+    def _put(self, data: bytes) -> None:
+        self._stream.write(data)
+        self._offset += len(data)
+        self._crc = zlib.crc32(data, self._crc)
