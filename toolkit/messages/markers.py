@@ -1,6 +1,6 @@
 """MarkerArray: shapes and texts that RViz and Foxglove draw."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, ClassVar, Self
 
@@ -37,7 +37,7 @@ class Marker:
     size_m: Array
     color: Color
     text: str = ""
-    points_m: Array = np.zeros((0, 3))  # noqa: RUF009 - never written to
+    points_m: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,6 +1,6 @@
 """LandmarkMatch: how one bundle was matched to the map, or why not."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any, ClassVar, Self
 
@@ -35,9 +35,9 @@ class LandmarkMatch:
     status: Status
     object_ids: tuple[str, ...] = ()
     landmark_ids: tuple[str, ...] = ()
-    residual_m: Array = np.zeros(0)  # noqa: RUF009 - never written to
+    residual_m: Array = field(default_factory=lambda: np.zeros(0))
     candidate_ids: tuple[str, ...] = ()
-    candidate_scores: Array = np.zeros(0)  # noqa: RUF009 - never written to
+    candidate_scores: Array = field(default_factory=lambda: np.zeros(0))
     expected_accidental: float = 0.0
     chi2: float = 0.0
     dof: int = 0

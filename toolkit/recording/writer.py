@@ -11,11 +11,11 @@ from typing import Any, BinaryIO
 from mcap import records
 from zstandard import ZstdCompressor
 
+from toolkit.atomic import atomic_file
 from toolkit.errors import RecordingError
 from toolkit.messages.codec import encode
 from toolkit.messages.qos import KEY, qos_profile
 from toolkit.messages.typestore import definition
-from toolkit.atomic import atomic_file
 from toolkit.recording.container import MAGIC, MESSAGE, MESSAGE_FIXED, Opcode, serialize
 from toolkit.recording.summary import summary_section
 from toolkit.stage import Channel, Connection, RawMessage, Stamped
