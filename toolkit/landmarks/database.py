@@ -1,0 +1,152 @@
+"""The landmark database: one map in one SQLite file, whose bytes depend on the map alone."""
+
+import contextlib
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+
+from toolkit.atomic import atomic_file
+from toolkit.errors import MapError
+from toolkit.landmarks.model import Group, LandmarkMap, Source
+from toolkit.resources import resource
+
+APPLICATION_ID = 0x4D434C4D
+SCHEMA_VERSION = 1
+_UPPER = np.triu_indices(3)
+
+
+def read_map(path: Path) -> LandmarkMap:
+    """The map in a database.
+
+    Raises:
+        MapError: no such file, no landmark database, another schema version, or damaged content.
+    """
+    if not path.is_file():
+        raise MapError(f"{path}: there is no such map; build it with `map` or `landmarks import`")
+    try:
+        with _reading(path) as database:
+            _check_version(path, database)
+            return _read(database)
+    except (sqlite3.Error, ValueError, TypeError, KeyError) as error:
+        raise MapError(f"{path}: is not a landmark database or is damaged ({error}); build it again") from error
+
+
+def write_map(path: Path, landmark_map: LandmarkMap) -> None:
+    """Write a map to a new database, or over the old one once it is whole. Same map, same bytes.
+
+    Raises:
+        ToolkitError: the file cannot be written.
+    """
+    with contextlib.closing(sqlite3.connect(":memory:", isolation_level=None)) as database:
+        database.executescript(f"BEGIN;\n{resource('schemas', 'landmarks.sql').read_text(encoding='utf-8')}")
+        _write(database, landmark_map)
+        database.execute("COMMIT")
+        content = database.serialize()
+    with atomic_file(path) as stream:
+        stream.write(content)
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[sqlite3.Connection]:
+    # immutable: no journal or lock file appears beside a map that is only read
+    address = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
+    with contextlib.closing(sqlite3.connect(address, uri=True)) as database:
+        yield database
+
+
+def _check_version(path: Path, database: sqlite3.Connection) -> None:
+    application = database.execute("PRAGMA application_id").fetchone()[0]
+    version = database.execute("PRAGMA user_version").fetchone()[0]
+    if application != APPLICATION_ID:
+        raise MapError(f"{path}: is an SQLite file but no landmark database; name one that `map` made")
+    if version != SCHEMA_VERSION:
+        raise MapError(
+            f"{path}: has schema version {version}, this program speaks {SCHEMA_VERSION}; build the map again, "
+            "or export it with the version that made it and import that"
+        )
+
+
+def _read(database: sqlite3.Connection) -> LandmarkMap:
+    frame = database.execute("SELECT frame FROM map").fetchone()
+    if frame is None:
+        raise ValueError("its table map is empty")
+    rows = database.execute(
+        "SELECT number, id, class, x_m, y_m, var_x_m2, cov_xy_m2, var_y_m2, radius_m, sightings, tentative"
+        " FROM landmark ORDER BY number"
+    ).fetchall()
+    numbers = np.array([row[3:9] for row in rows], dtype=np.float64).reshape(-1, 6)
+    return LandmarkMap(
+        ids=tuple(row[1] for row in rows),
+        classes=tuple(row[2] for row in rows),
+        positions_xy=numbers[:, :2],
+        covariances=numbers[:, [2, 3, 3, 4]].reshape(-1, 2, 2),
+        radii_m=numbers[:, 5],
+        sightings=np.array([row[9] for row in rows], dtype=np.int64),
+        tentative=np.array([row[10] for row in rows], dtype=np.bool_),
+        groups=_read_groups(database, {row[0]: row[1] for row in rows}),
+        sources=tuple(
+            Source(*row)
+            for row in database.execute("SELECT kind, fingerprint, bundles, used FROM source ORDER BY number")
+        ),
+        frame=frame[0],
+    )
+
+
+def _read_groups(database: sqlite3.Connection, id_of_number: dict[int, str]) -> tuple[Group, ...]:
+    members: dict[int, list[str]] = {}
+    for group, landmark in database.execute(
+        "SELECT landmark_group, landmark FROM member ORDER BY landmark_group, place"
+    ):
+        members.setdefault(group, []).append(id_of_number[landmark])
+    groups = []
+    for number, *values in database.execute(
+        "SELECT number, x_m, y_m, heading_rad, var_x_m2, cov_xy_m2, cov_xh_m, var_y_m2, cov_yh_m, var_h"
+        " FROM landmark_group ORDER BY number"
+    ):
+        covariance = None
+        if values[3] is not None:
+            covariance = np.zeros((3, 3))
+            covariance[_UPPER] = covariance.T[_UPPER] = values[3:]
+        groups.append(Group(tuple(members[number]), np.array(values[:3], dtype=np.float64), covariance))
+    return tuple(groups)
+
+
+def _write(database: sqlite3.Connection, landmark_map: LandmarkMap) -> None:
+    database.execute("INSERT INTO map VALUES (?)", (landmark_map.frame,))
+    spread = landmark_map.covariances
+    numbers = np.column_stack(
+        [landmark_map.positions_xy, spread[:, 0, 0], spread[:, 0, 1], spread[:, 1, 1], landmark_map.radii_m]
+    ).tolist()
+    rows = zip(
+        range(len(landmark_map)),
+        landmark_map.ids,
+        landmark_map.classes,
+        numbers,
+        landmark_map.sightings.tolist(),
+        landmark_map.tentative.tolist(),
+        strict=True,
+    )
+    database.executemany(
+        "INSERT INTO landmark VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", ((*row[:3], *row[3], *row[4:]) for row in rows)
+    )
+    number_of_id = {identity: number for number, identity in enumerate(landmark_map.ids)}
+    for i, group in enumerate(landmark_map.groups):
+        covariance = [None] * 6 if group.covariance is None else group.covariance[_UPPER].tolist()
+        database.execute(
+            "INSERT INTO landmark_group VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            (i, *group.map_from_base.tolist(), *covariance),
+        )
+        database.executemany(
+            "INSERT INTO member VALUES (?, ?, ?)",
+            ((i, place, number_of_id[identity]) for place, identity in enumerate(group.landmark_ids)),
+        )
+    database.executemany(
+        "INSERT INTO source VALUES (?, ?, ?, ?, ?)",
+        (
+            (i, source.kind, source.fingerprint, source.bundles, source.used)
+            for i, source in enumerate(landmark_map.sources)
+        ),
+    )
