@@ -2,14 +2,11 @@
 
 from io import BytesIO
 from struct import Struct
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TypeVar
 
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import McapRecord
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD = Struct("<BQ")  # opcode, length
@@ -20,18 +17,13 @@ FOOTER_SIZE = RECORD.size + 20
 LARGEST_CHUNK = 1 << 30
 """A chunk that claims to be larger than this is taken for damage, and not allocated."""
 
-R = TypeVar("R")
+R = TypeVar("R", bound=McapRecord)
 
 
-class Readable(Protocol[R]):
-    """A record class of mcap.records."""
-
-    read: "Callable[[ReadDataStream], R]"
-
-
-def parse(record: Readable[R], content: bytes | memoryview) -> R:
+def parse(record: type[R], content: bytes | memoryview) -> R:
     """Record of a class of mcap.records from its content, the bytes after opcode and length."""
-    return record.read(ReadDataStream(BytesIO(content)))
+    found: R = record.read(ReadDataStream(BytesIO(content)))  # type: ignore[attr-defined] # every record class has it
+    return found
 
 
 def serialize(*records: McapRecord) -> bytes:

@@ -128,7 +128,10 @@ class RecordingWriter:
         self._message_counts[channel_id] += 1
         self.counts[raw.connection.topic] += 1
         if len(chunk.data) >= CHUNK_BYTES or chunk.end_ns - chunk.start_ns >= CHUNK_NS:
-            self._flush(self._chunks.pop(group))
+            for name in [key for key, other in self._chunks.items() if time_ns - other.start_ns >= CHUNK_NS]:
+                self._flush(self._chunks.pop(name))
+            if group in self._chunks:
+                self._flush(self._chunks.pop(group))
 
     def add(self, stamped: Stamped, group: str = "") -> None:
         """Encode a message of ours and write it; it is published when it is logged."""

@@ -1,0 +1,167 @@
+"""Read recordings: by index where there is one, by scanning where there is none, in the order of log time."""
+
+import contextlib
+import heapq
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from struct import error as struct_error
+from typing import BinaryIO
+
+from mcap import records
+from mcap.exceptions import McapError
+
+from toolkit.errors import RecordingError
+from toolkit.recording.blocks import DamagedBlockError, Progress, block_messages
+from toolkit.recording.container import MAGIC, Opcode, parse
+from toolkit.recording.index import Block, Index, index_from_summary, read_record
+from toolkit.recording.scan import index_by_scanning
+from toolkit.stage import Connection, RawMessage
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelSummary:
+    """A channel and the number of its messages."""
+
+    connection: Connection
+    count: int
+
+
+@contextlib.contextmanager
+def open_recording(path: Path, *, verify: bool = True) -> Iterator["Recording"]:
+    """An open recording; `verify` checks the CRC of every chunk that is read.
+
+    Raises:
+        RecordingError: there is no such file, or it is not an MCAP file.
+    """
+    try:
+        with path.open("rb") as stream:
+            yield Recording(path, stream, _index(path, stream), verify=verify)
+    except FileNotFoundError as error:
+        raise RecordingError(f"{path}: there is no such file") from error
+    except IsADirectoryError as error:
+        raise RecordingError(
+            f"{path} is a folder; convert it first: mcap-landmarks convert {path} -o LOG.mcap"
+        ) from error
+    except PermissionError as error:
+        raise RecordingError(f"{path} may not be read; change its permissions") from error
+
+
+def _index(path: Path, stream: BinaryIO) -> Index:
+    size = stream.seek(0, 2)
+    stream.seek(0)
+    if size == 0:
+        raise RecordingError(f"{path} is empty (0 bytes); record or copy it again")
+    if stream.read(len(MAGIC)) != MAGIC:
+        raise RecordingError(f"{path} is not an MCAP file; mcap-landmarks convert reads bags and data sets")
+    try:
+        opcode, content = read_record(stream, len(MAGIC))
+        if opcode != Opcode.HEADER:
+            raise RecordingError(f"{path} does not begin with an MCAP header; copy it again")
+        header = parse(records.Header, content)
+    except (EOFError, McapError, struct_error, ValueError, MemoryError, OverflowError) as error:
+        raise RecordingError(f"{path} ends within its MCAP header; copy it again") from error
+    return index_from_summary(stream, size, header) or index_by_scanning(stream, size, header)
+
+
+class Recording:
+    """An open recording; made by `open_recording`.
+
+    `channels` lists every channel with its count, `start_ns` and `end_ns` are the first and last log time, `metadata`
+    holds the entries of every metadata record by name. `losses` says in words what could not be read, so far.
+    """
+
+    def __init__(self, path: Path, stream: BinaryIO, index: Index, *, verify: bool) -> None:
+        self.path = path
+        self.profile, self.library = index.header.profile, index.header.library
+        self.start_ns, self.end_ns = index.start_ns, index.end_ns
+        self.metadata = index.metadata
+        self.losses = list(index.losses)
+        self._stream, self._index, self._verify = stream, index, verify
+        self._connections = {key: _connection(index, channel) for key, channel in sorted(index.channels.items())}
+        self.channels = tuple(
+            ChannelSummary(connection, index.counts.get(key, 0)) for key, connection in self._connections.items()
+        )
+        orphans = sum(count for key, count in index.counts.items() if key not in self._connections)
+        if orphans:
+            self.losses.append(f"{orphans} messages belong to channels that are nowhere described; they are left out")
+
+    def connections(self, topic: str) -> tuple[Connection, ...]:
+        """The connections of a topic, most often one."""
+        return tuple(entry.connection for entry in self.channels if entry.connection.topic == topic)
+
+    def attachments(self) -> Iterator[records.Attachment]:
+        """The attachments, whole, in the order of the file."""
+        for offset in self._index.attachments:
+            yield parse(records.Attachment, read_record(self._stream, offset)[1])
+
+    def messages(
+        self,
+        connections: Collection[Connection] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+        progress: Progress | None = None,
+    ) -> Iterator[RawMessage]:
+        """Messages by log time, all or those of some connections, from `start_ns` on and before `end_ns`.
+
+        Holds only the chunks in memory that overlap in time. `progress` is told the bytes of each chunk that was read.
+        """
+        wanted = {key: c for key, c in self._connections.items() if connections is None or c in connections}
+        first = 0 if start_ns is None else start_ns
+        last = 2**64 if end_ns is None else end_ns
+        blocks = [block for block in self._index.blocks if block.end_ns >= first and block.start_ns < last]
+        blocks.sort(key=lambda block: (block.start_ns, block.offset))
+        for message in self._merge(blocks, wanted, progress):
+            if first <= message.log_time_ns < last:
+                yield message
+
+    def _load(self, block: Block, wanted: dict[int, Connection], progress: Progress | None) -> list[RawMessage]:
+        try:
+            found = block_messages(self._stream, block, wanted, verify=self._verify)
+        except DamagedBlockError as error:
+            loss = f"the chunk at byte {block.offset} is damaged ({error}); its messages are left out"
+            if loss not in self.losses:
+                self.losses.append(loss)
+            found = []
+        if progress:
+            progress(block.length)
+        return found
+
+    def _merge(
+        self, blocks: list[Block], wanted: dict[int, Connection], progress: Progress | None
+    ) -> Iterator[RawMessage]:
+        """Messages of blocks that are sorted by their start, which may overlap."""
+        active: list[tuple[int, int, int, list[RawMessage]]] = []  # time of the next message, block, position, messages
+        for number, block in enumerate(blocks):
+            yield from _drain(active, block.start_ns)
+            messages = self._load(block, wanted, progress)
+            if messages:
+                heapq.heappush(active, (messages[0].log_time_ns, number, 0, messages))
+        yield from _drain(active, 2**64)
+
+
+def _drain(active: list[tuple[int, int, int, list[RawMessage]]], until_ns: int) -> Iterator[RawMessage]:
+    """Messages before `until_ns`, in order, from the heap of open blocks; of equal times the earlier block's first."""
+    while active and active[0][0] < until_ns:
+        _, number, position, messages = heapq.heappop(active)
+        rival_ns, rival = (active[0][0], active[0][1]) if active else (until_ns, -1)
+        end = len(messages)
+        while position < end:
+            time_ns = messages[position].log_time_ns
+            if time_ns >= until_ns or time_ns > rival_ns or (time_ns == rival_ns and number > rival):
+                heapq.heappush(active, (time_ns, number, position, messages))
+                break
+            yield messages[position]
+            position += 1
+
+
+def _connection(index: Index, channel: records.Channel) -> Connection:
+    schema = index.schemas.get(channel.schema_id)
+    return Connection(
+        channel.topic,
+        schema.name if schema else "",
+        schema.data if schema else b"",
+        schema.encoding if schema else "",
+        channel.message_encoding,
+        channel.metadata,
+    )
