@@ -1,0 +1,84 @@
+"""What the verbs share with the terminal: results, warnings, progress, errors and exit codes."""
+
+import contextlib
+import json
+import math
+import os
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+from toolkit.errors import ToolkitError
+
+DONE, UNUSABLE, USAGE, PARTIAL, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+def run_command(application: Callable[..., object], arguments: Sequence[str]) -> int:
+    """Run a typer application and turn what it raises into one line on stderr and an exit code."""
+    try:
+        application(arguments, standalone_mode=True)
+    except ToolkitError as error:
+        warn(f"error: {error}")
+        return error.exit_code
+    except KeyboardInterrupt:
+        warn("interrupted; nothing unfinished was left behind")
+        return INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except SystemExit as stop:
+        return stop.code if isinstance(stop.code, int) else DONE
+    return DONE
+
+
+def warn(text: str) -> None:
+    """One line on stderr."""
+    print(" ".join(text.split()), file=sys.stderr)
+
+
+def say(text: str = "") -> None:
+    """A result on stdout."""
+    print(text)
+
+
+def say_json(verb: str, document: Mapping[str, object]) -> None:
+    """The one document of `--json` on stdout; figures that are not finite become null, as JSON has none."""
+    print(json.dumps({"schema": f"mcap-landmarks/{verb}/1", **_plain(document)}, indent=2, ensure_ascii=False))
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - any JSON value
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Columns on stdout: the first flush left, the others flush right."""
+    widths = [max(len(row[i]) for row in (head, *rows)) for i in range(len(head))]
+    for row in (head, *rows):
+        cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
+        say("  ".join(cells).rstrip())
+
+
+@contextlib.contextmanager
+def progress(label: str, total: int | None = None, unit: str = "bytes") -> Iterator[Callable[[int], None]]:
+    """A bar on stderr while the block runs, if stderr is a terminal; the block calls it with each advance.
+
+    `unit` is `bytes`, which shows a transfer rate, or the name of what is counted.
+    """
+    if not sys.stderr.isatty():
+        yield lambda _advance: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, DownloadColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import TransferSpeedColumn as Speed
+
+    amount = [DownloadColumn(), Speed()] if unit == "bytes" else [MofNCompleteColumn(), TextColumn(unit)]
+    columns = [TextColumn("{task.description}"), BarColumn(), *amount, TimeRemainingColumn()]
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda advance: bar.update(task, advance=advance)
