@@ -25,6 +25,14 @@ class Connection:
     metadata: Mapping[str, str] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class ChannelSummary:
+    """A connection and the number of its messages that the storage declares."""
+
+    connection: Connection
+    count: int
+
+
 class RawMessage(NamedTuple):
     """One message as it lies in a recording; a tuple, since hot loops make millions."""
 

@@ -3,7 +3,6 @@
 import contextlib
 import heapq
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from struct import error as struct_error
 from typing import BinaryIO
@@ -16,15 +15,7 @@ from toolkit.recording.blocks import DamagedBlockError, Progress, block_messages
 from toolkit.recording.container import MAGIC, Opcode, parse
 from toolkit.recording.index import Block, Index, index_from_summary, read_record
 from toolkit.recording.scan import index_by_scanning
-from toolkit.stage import Connection, RawMessage
-
-
-@dataclass(frozen=True, slots=True)
-class ChannelSummary:
-    """A channel and the number of its messages."""
-
-    connection: Connection
-    count: int
+from toolkit.stage import ChannelSummary, Connection, RawMessage
 
 
 @contextlib.contextmanager
