@@ -96,3 +96,20 @@ class Stage:
     process: Process
     resources: tuple[str, ...] = ()
     tolerance: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Reduction:
+    """The step that makes one result of many logs: `collect` per log, then `solve` over what was collected.
+
+    `collect(bundles, config)` gives one log's observations, `solve(observations, prior, config)` the map and one
+    trajectory per log.
+    """
+
+    name: str
+    reads: tuple[Channel[Any], ...]
+    writes: tuple[Channel[Any], ...]
+    config: type[Any]
+    collect: Callable[[Iterable[Bundle], Any], Any]
+    solve: Callable[..., Any]
+    tolerance: Mapping[str, float] = field(default_factory=dict)

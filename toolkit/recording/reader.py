@@ -1,6 +1,7 @@
 """Read recordings: by index where there is one, by scanning where there is none, in the order of log time."""
 
 import contextlib
+import hashlib
 import heapq
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -11,8 +12,9 @@ from mcap import records
 from mcap.exceptions import McapError
 
 from toolkit.errors import RecordingError
+from toolkit.manifest import carried_fingerprint
 from toolkit.recording.blocks import DamagedBlockError, Progress, block_messages
-from toolkit.recording.container import MAGIC, Opcode, parse
+from toolkit.recording.container import CHUNK, MAGIC, RECORD, Opcode, parse
 from toolkit.recording.index import Block, Index, index_from_summary, read_record
 from toolkit.recording.scan import index_by_scanning
 from toolkit.stage import ChannelSummary, Connection, RawMessage
@@ -80,6 +82,20 @@ class Recording:
     def connections(self, topic: str) -> tuple[Connection, ...]:
         """The connections of a topic, most often one."""
         return tuple(entry.connection for entry in self.channels if entry.connection.topic == topic)
+
+    def fingerprint(self) -> str:
+        """Identity by content: that of the recording whose results this one carries, else a hash over its blocks."""
+        carried = carried_fingerprint(self.metadata)
+        if carried:
+            return carried
+        digest = hashlib.sha256()
+        for block in self._index.blocks:
+            self._stream.seek(block.offset)
+            if block.is_chunk:  # times, size and CRC stand for the content, which need not be read
+                digest.update(self._stream.read(RECORD.size + CHUNK.size)[RECORD.size :])
+            else:
+                digest.update(self._stream.read(block.length))
+        return digest.hexdigest()
 
     def attachments(self) -> Iterator[records.Attachment]:
         """The attachments, whole, in the order of the file."""

@@ -1,0 +1,1 @@
+"""Runs: what a verb does, from files to files."""
