@@ -1,0 +1,1 @@
+"""Tests of poses and landmarks from ranges and bearings."""

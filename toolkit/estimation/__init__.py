@@ -1,0 +1,1 @@
+"""Poses and landmarks from ranges and bearings: pure functions on arrays."""
