@@ -67,7 +67,7 @@ class AssetStore:
             bodies.append(Body(body, shapes.labelled))
         return tuple(bodies)
 
-    def texture(self, image: Image) -> int:
+    def _texture(self, image: Image) -> int:
         """PyBullet's handle of a new texture from an RGB image (H,W,3)."""
         path = Path(self._folder.name) / f"{self._texture_count}.png"
         self._texture_count += 1
@@ -76,7 +76,7 @@ class AssetStore:
         path.unlink()
         return handle
 
-    def visual(self, part: Part) -> int:
+    def _visual(self, part: Part) -> int:
         """PyBullet's handle of a part's visual mesh, still without its texture."""
         handle: int = pybullet.createVisualShape(
             pybullet.GEOM_MESH,
@@ -96,7 +96,7 @@ class AssetStore:
         shapes = []
         for part in asset.parts:
             if id(part.texture) not in textures:
-                textures[id(part.texture)] = self.texture(part.texture)
+                textures[id(part.texture)] = self._texture(part.texture)
             collision = pybullet.createCollisionShape(
                 pybullet.GEOM_MESH,
                 vertices=part.vertices.tolist(),
@@ -104,5 +104,5 @@ class AssetStore:
                 flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
                 physicsClientId=self._client,
             )
-            shapes.append(_Shapes(self.visual(part), collision, textures[id(part.texture)], part.labelled))
+            shapes.append(_Shapes(self._visual(part), collision, textures[id(part.texture)], part.labelled))
         return tuple(shapes)
