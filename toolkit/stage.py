@@ -61,16 +61,25 @@ class Stamped:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bundle:
-    """What belongs to one moment: the messages associated with it, by channel, and the odometry at its stamp.
+class OdometryAt:
+    """Odometry at one moment: odom_from_base (3,) x, y, heading in `frame_id`, and the (3, 3) covariance it came with.
 
-    odom_from_base (3,) is x, y, heading interpolated at `stamp_ns`, None where the log has none then.
+    The covariance is that of the message before; all zero where the log leaves it unknown.
     """
+
+    frame_id: str
+    odom_from_base: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bundle:
+    """What belongs to one moment: the messages associated with it, by channel, and the odometry at its stamp."""
 
     stamp_ns: int
     log_time_ns: int
     messages: Mapping[Channel[Any], Message]
-    odom_from_base: Array | None = None
+    odometry: OdometryAt | None = None
 
     def get(self, channel: Channel[M]) -> M | None:
         """The bundle's message of a channel, None if it has none."""

@@ -176,6 +176,11 @@ class Odometry:
         """x, y, heading (3,)."""
         return planar_pose(self.position_m, self.orientation_xyzw)
 
+    @property
+    def planar_covariance(self) -> Array:
+        """Covariance (3, 3) of x, y, heading."""
+        return self.pose_covariance[PLANAR]
+
     def to_ros(self) -> Any:
         """See `Message`."""
         twist = make(

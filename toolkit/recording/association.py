@@ -11,7 +11,7 @@ import numpy as np
 from toolkit.geometry.se2 import Array, interpolate
 from toolkit.messages.codec import Message
 from toolkit.messages.poses import Odometry
-from toolkit.stage import Bundle, Channel
+from toolkit.stage import Bundle, Channel, OdometryAt
 
 WINDOW_NS = 2 * 10**9
 """How long a bundle waits for its partners, and the widest gap that odometry is interpolated over."""
@@ -36,12 +36,15 @@ class _Trail:
         self._counts = counts
         self._stamps: deque[int] = deque()
         self._poses: deque[Array] = deque()
+        self._covariances: deque[Array] = deque()
+        self._frame_id = ""
 
     @property
     def latest_ns(self) -> int:
         return self._stamps[-1] if self._stamps else -(2**63)
 
-    def add(self, stamp_ns: int, pose: Array) -> None:
+    def add(self, stamp_ns: int, message: Odometry) -> None:
+        pose = message.pose
         if not np.isfinite(pose).all():
             self._counts.odometry_not_finite += 1
             return
@@ -50,23 +53,26 @@ class _Trail:
             return
         self._stamps.append(stamp_ns)
         self._poses.append(pose)
+        self._covariances.append(message.planar_covariance)
+        self._frame_id = message.frame_id
         while self._stamps[0] < stamp_ns - _KEPT_NS and len(self._stamps) > 2:
             self._stamps.popleft()
             self._poses.popleft()
+            self._covariances.popleft()
 
-    def at(self, stamp_ns: int) -> Array | None:
-        """Pose (3,) at a time between two stamps that are close enough together, else None."""
+    def at(self, stamp_ns: int) -> OdometryAt | None:
+        """Odometry at a time between two stamps that are close enough together, else None."""
         right = bisect_left(self._stamps, stamp_ns)
         if right == len(self._stamps):
             return None
         if self._stamps[right] == stamp_ns:
-            return self._poses[right]
+            return OdometryAt(self._frame_id, self._poses[right], self._covariances[right])
         if right == 0 or self._stamps[right] - self._stamps[right - 1] > WINDOW_NS:
             return None
         times = np.array([self._stamps[right - 1], self._stamps[right]], dtype=np.int64)
         poses = np.stack([self._poses[right - 1], self._poses[right]])
-        pose: Array = interpolate(times, poses, np.array([stamp_ns], dtype=np.int64))[0]
-        return pose
+        pose = interpolate(times, poses, np.array([stamp_ns], dtype=np.int64))[0]
+        return OdometryAt(self._frame_id, pose, self._covariances[right - 1])
 
 
 def associate(
@@ -85,7 +91,7 @@ def associate(
         if channel == primary:
             waiting.append(Bundle(stamp_ns, log_time_ns, {channel: message}))
         elif isinstance(message, Odometry):
-            trail.add(stamp_ns, message.pose)
+            trail.add(stamp_ns, message)
         while waiting and (trail.latest_ns >= waiting[0].stamp_ns or log_time_ns - waiting[0].log_time_ns > WINDOW_NS):
             yield _finish(waiting.popleft(), trail, counts)
     while waiting:
@@ -93,7 +99,7 @@ def associate(
 
 
 def _finish(bundle: Bundle, trail: _Trail, counts: Association) -> Bundle:
-    pose = trail.at(bundle.stamp_ns)
+    odometry = trail.at(bundle.stamp_ns)
     counts.bundles += 1
-    counts.without_odometry += pose is None
-    return Bundle(bundle.stamp_ns, bundle.log_time_ns, bundle.messages, pose)
+    counts.without_odometry += odometry is None
+    return Bundle(bundle.stamp_ns, bundle.log_time_ns, bundle.messages, odometry)

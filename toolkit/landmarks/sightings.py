@@ -1,0 +1,53 @@
+"""Scene objects made fit to use: unusable ones dropped and counted, unknown covariances filled in."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolkit.estimation.sightings import points_from_polar
+from toolkit.geometry.se2 import Array
+from toolkit.messages.scene import SceneObjects
+
+
+def pick(scene: SceneObjects, rows: Sequence[int] | NDArray[np.int64]) -> SceneObjects:
+    """The objects of some rows."""
+    keep = np.asarray(rows, dtype=np.int64)
+    return SceneObjects(
+        scene.stamp_ns,
+        scene.frame_id,
+        tuple(scene.ids[i] for i in keep),
+        tuple(scene.hypotheses[i] for i in keep),
+        scene.positions_xy[keep],
+        scene.covariances[keep],
+        scene.radii_m[keep],
+    )
+
+
+def usable(scene: SceneObjects, dropped: Counter[str]) -> SceneObjects:
+    """Objects with a class, finite numbers and a covariance that is positive definite or all zero (unknown).
+
+    What else the scene holds is left out and counted by reason in `dropped`.
+    """
+    finite = np.isfinite(scene.positions_xy).all(axis=1) & np.isfinite(scene.covariances).all(axis=(1, 2))
+    a, b, c = scene.covariances[:, 0, 0], scene.covariances[:, 0, 1], scene.covariances[:, 1, 1]
+    unknown: NDArray[np.bool_] = np.logical_not(scene.covariances.any(axis=(1, 2)))
+    with np.errstate(invalid="ignore", over="ignore"):
+        symmetric = np.abs(b - scene.covariances[:, 1, 0]) <= 1e-6 * (np.abs(a) + np.abs(c))
+        definite = symmetric & (a > 0) & (c > 0) & (a * c - b * b > 0)
+    named = np.array([bool(options) for options in scene.hypotheses], dtype=np.bool_)
+    dropped["objects with numbers that are not finite"] += int((~finite).sum())
+    dropped["objects whose covariance is not positive definite"] += int((finite & ~unknown & ~definite).sum())
+    dropped["objects without a class"] += int((finite & (unknown | definite) & ~named).sum())
+    keep = finite & (unknown | definite) & named
+    return scene if keep.all() else pick(scene, np.flatnonzero(keep))
+
+
+def known_covariances(scene: SceneObjects, range_sigma_m: float, bearing_sigma_rad: float) -> Array:
+    """Covariances (N, 2, 2) in m^2, those that are unknown from the sigmas of range and bearing."""
+    x, y = scene.positions_xy[:, 0], scene.positions_xy[:, 1]
+    polar = np.diag([range_sigma_m**2, bearing_sigma_rad**2])
+    _, filled = points_from_polar(np.hypot(x, y), np.arctan2(y, x), polar)
+    unknown: NDArray[np.bool_] = np.logical_not(scene.covariances.any(axis=(1, 2)))
+    return np.where(unknown[:, None, None], filled, scene.covariances)

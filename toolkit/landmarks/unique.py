@@ -1,0 +1,25 @@
+"""Association by class alone, where a class stands for one landmark, as with numbered beacons or tags."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolkit.landmarks.model import LandmarkMap
+
+
+def unique_classes(landmark_map: LandmarkMap) -> dict[str, int]:
+    """Row of the landmark of each class that no other landmark of the map has."""
+    counts = Counter(landmark_map.classes)
+    return {name: row for row, name in enumerate(landmark_map.classes) if counts[name] == 1}
+
+
+def pairs_by_class(
+    classes: Sequence[str], landmark_of: Mapping[str, int]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows of objects (K,) and of landmarks (K,) that belong together; a class seen twice in one bundle is left out."""
+    seen = Counter(classes)
+    rows = [i for i, name in enumerate(classes) if name in landmark_of and seen[name] == 1]
+    landmarks = [landmark_of[classes[i]] for i in rows]
+    return np.array(rows, dtype=np.int64), np.array(landmarks, dtype=np.int64)

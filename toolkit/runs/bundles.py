@@ -1,0 +1,109 @@
+"""One recording as the bundles that a stage reads, in one pass."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from toolkit.errors import MessageError, RecordingError
+from toolkit.landmarks.sightings import usable
+from toolkit.messages.codec import Message, decode
+from toolkit.messages.scene import SceneObjects
+from toolkit.recording.association import Association, associate
+from toolkit.recording.reader import Recording
+from toolkit.runs.inputs import ROLES, Choice, choose
+from toolkit.stage import Bundle, Channel, Connection, RawMessage
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """What of a recording is read: topics by role, and log times from `start_ns` on and before `end_ns`."""
+
+    choice: Choice = field(default_factory=Choice)
+    start_ns: int | None = None
+    end_ns: int | None = None
+
+
+@dataclass(slots=True)
+class Reading:
+    """What became of a recording's messages: what was associated, dropped by rule, or lost to damage."""
+
+    association: Association = field(default_factory=Association)
+    dropped: Counter[str] = field(default_factory=Counter)
+    losses: list[str] = field(default_factory=list)
+
+    def notes(self) -> dict[str, int]:
+        """Everything that was left out by rule, in words, with its count; nothing where nothing was."""
+        association = self.association
+        found = Counter(self.dropped)
+        found["bundles without odometry at their time"] += association.without_odometry
+        found["odometry messages whose time goes backwards"] += association.odometry_out_of_order
+        found["odometry messages with numbers that are not finite"] += association.odometry_not_finite
+        return {reason: count for reason, count in sorted(found.items()) if count}
+
+
+def inputs_of(
+    recording: Recording, reads: Iterable[Channel[Any]], required: Iterable[Channel[Any]], choice: Choice
+) -> dict[Connection, Channel[Any]]:
+    """The connections that a stage reads, each with the channel it stands for.
+
+    Raises:
+        RecordingError: a required input is missing or has no messages.
+        UsageError: see `choose`.
+    """
+    found: dict[Connection, Channel[Any]] = {}
+    counts = {entry.connection: entry.count for entry in recording.channels}
+    needed = set(required)
+    for channel in reads:
+        connections = choose(recording, channel, choice)
+        found.update(dict.fromkeys(connections, channel))
+        if channel in needed and not sum(counts[connection] for connection in connections):
+            raise RecordingError(_missing(recording, channel, bool(connections)))
+    return found
+
+
+def _missing(recording: Recording, channel: Channel[Any], empty: bool) -> str:
+    role = ROLES[channel]
+    if empty:
+        return f"{recording.path}: the {role.name} topic has no messages; record it, or choose another log"
+    kinds = " or ".join(role.types)
+    return (
+        f"{recording.path}: there is no {role.name} ({kinds}); choose a topic with {role.option}, or take "
+        f"a log that has one, such as {channel.topic}"
+    )
+
+
+def read_bundles(
+    raws: Iterable[RawMessage],
+    inputs: Mapping[Connection, Channel[Any]],
+    primary: Channel[Any],
+    reading: Reading,
+) -> Iterator[Bundle]:
+    """The bundles of messages by log time; `reading` is kept up to date.
+
+    A message that cannot be decoded is a loss, an unusable object is dropped; both are counted.
+    """
+    return associate(_decoded(raws, inputs, reading), primary, reading.association)
+
+
+def _decoded(
+    raws: Iterable[RawMessage], inputs: Mapping[Connection, Channel[Any]], reading: Reading
+) -> Iterator[tuple[Channel[Any], int, Message]]:
+    broken: Counter[str] = Counter()
+    for raw in raws:
+        channel = inputs.get(raw.connection)
+        if channel is None:
+            continue
+        try:
+            message: Message = decode(channel.message, raw.data)
+        except MessageError as error:
+            broken[raw.connection.topic] += 1
+            if broken[raw.connection.topic] == 1:
+                reading.losses.append(f"{raw.connection.topic} at {raw.log_time_ns}: {error}")
+            continue
+        if isinstance(message, SceneObjects):
+            message = usable(message, reading.dropped)
+        yield channel, raw.log_time_ns, message
+    reading.losses.extend(
+        f"{topic}: {count} messages could not be decoded in all" for topic, count in broken.items() if count > 1
+    )
