@@ -49,14 +49,14 @@ def _from_file(path: Path) -> Settings:
     return tables
 
 
-def _value(text: str) -> Any:  # noqa: ANN401 - any TOML value
+def _value(text: str) -> Any:
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         return text
 
 
-def stage_config(config: type[Any], stage: str, settings: Mapping[str, Any]) -> Any:  # noqa: ANN401 - the given type
+def stage_config(config: type[Any], stage: str, settings: Mapping[str, Any]) -> Any:
     """The configuration of one stage: its defaults with the settings over them.
 
     Raises:
@@ -73,12 +73,12 @@ def stage_config(config: type[Any], stage: str, settings: Mapping[str, Any]) -> 
         raise UsageError(f"{where} = {first['input']!r}: {first['msg']}") from error
 
 
-def effective(config: Any) -> dict[str, Any]:  # noqa: ANN401 - any stage's configuration
+def effective(config: Any) -> dict[str, Any]:
     """Every key with its value, for the manifest."""
     return dataclasses.asdict(config)
 
 
-def load(name: str, settings: Settings) -> Any:  # noqa: ANN401 - the stage's own type
+def load(name: str, settings: Settings) -> Any:
     """The configuration of a stage by name."""
     return stage_config(find_stage(name).config, name, settings.get(name, {}))
 

@@ -40,7 +40,7 @@ class Job:
     results_only: bool = False
 
 
-def run_stage(stage: Stage, config: Any, job: Job, progress: Progress | None = None) -> StageRun:  # noqa: ANN401
+def run_stage(stage: Stage, config: Any, job: Job, progress: Progress | None = None) -> StageRun:
     """Run a stage over a recording; the output holds the input's messages, raw, unless only results are asked for.
 
     Raises:
@@ -101,7 +101,7 @@ def _copy(
         yield raw
 
 
-def _writes(stage: Stage, recording: Recording, config: Any, run: StageRun) -> set[str]:  # noqa: ANN401
+def _writes(stage: Stage, recording: Recording, config: Any, run: StageRun) -> set[str]:
     """Topics that the stage may write: without /tf if the odometry frame has a parent already."""
     topics = {channel.topic for channel in stage.writes}
     if TF.topic in topics and getattr(config, "tf", "auto") == "auto" and _odom_has_parent(recording):
