@@ -1,0 +1,147 @@
+"""ROS 1 bags: every message becomes ROS 2 CDR, in the order of the time at which it was recorded."""
+
+import contextlib
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+from toolkit.errors import MessageError, RecordingError
+from toolkit.messages.qos import KEY, qos_profile
+from toolkit.sources.bag_container import MAGIC, BagConnection, ChunkInfo, DamagedBagError
+from toolkit.sources.bag_index import BagIndex, read_chunk, read_index
+from toolkit.sources.merge import merge
+from toolkit.sources.ros1_types import Convert, converted
+from toolkit.sources.source import NoConfig, Progress, Source, SourceLog
+from toolkit.stage import ChannelSummary, Connection, RawMessage
+
+
+def recognises(path: Path) -> bool:
+    """A file named .bag, or one that begins as bags do."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        return path.suffix == ".bag" or stream.read(8) == MAGIC[:8]
+
+
+@contextlib.contextmanager
+def open_bag(path: Path, _config: NoConfig) -> Iterator[Sequence[SourceLog]]:
+    """The one log of a bag.
+
+    Raises:
+        RecordingError: it is no bag of format 2.0, is encrypted, or has a type that cannot be understood.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        start = stream.read(len(MAGIC))
+        if not start:
+            raise RecordingError(f"{path} is empty (0 bytes); record or copy it again")
+        if start != MAGIC:
+            remedy = "bring it to format 2.0 with `rosbag migrate`" if start[:8] == MAGIC[:8] else "check the file"
+            raise RecordingError(f"{path} is not a ROS 1 bag of format 2.0; {remedy}")
+        try:
+            index = read_index(stream, size)
+        except DamagedBagError as error:
+            raise RecordingError(f"{path} cannot be read: {error}; copy or decrypt it again") from error
+    yield [SourceLog(path.stem, (BagLog(path, size, index),), size)]
+
+
+class BagLog:
+    """The log in a bag. Connections that differ only in their publisher share one channel."""
+
+    def __init__(self, path: Path, size: int, index: BagIndex) -> None:
+        self.losses = index.losses
+        self._path, self._size, self._chunks = path, size, [chunk for chunk in index.chunks if chunk.counts]
+        self._connections: dict[int, Connection] = {}
+        self._convert: dict[Connection, Convert | MessageError] = {}
+        shared: dict[BagConnection, Connection] = {}
+        for key, described in sorted(index.connections.items()):
+            if described not in shared:
+                shared[described], convert = _carried(described)
+                self._convert[shared[described]] = convert
+            self._connections[key] = shared[described]
+        counts: Counter[Connection] = Counter()
+        for key, count in index.counts().items():
+            counts[self._connections[key]] += count
+        self.channels = [ChannelSummary(connection, counts[connection]) for connection in shared.values()]
+        self.start_ns = min((chunk.start_ns for chunk in self._chunks), default=None)
+        self.end_ns = max((chunk.end_ns for chunk in self._chunks), default=None)
+        self._misfits: Counter[Connection] = Counter()
+
+    def messages(
+        self,
+        connections: Collection[Connection] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+        progress: Progress | None = None,
+    ) -> Iterator[RawMessage]:
+        """See `Log`; a message that does not fit its definition is left out and told in `losses`.
+
+        Raises:
+            RecordingError: the definition of a wanted type cannot be understood.
+        """
+        wanted = {key: c for key, c in self._connections.items() if connections is None or c in connections}
+        convert = {connection: self._conversion(connection) for connection in wanted.values()}
+        first, last = start_ns or 0, 2**64 if end_ns is None else end_ns
+        chunks = [chunk for chunk in self._chunks if chunk.end_ns >= first and chunk.start_ns < last]
+        for raw in merge((chunk.start_ns, partial(self._load, chunk, wanted, progress)) for chunk in chunks):
+            if not first <= raw.log_time_ns < last:
+                continue
+            try:
+                data = convert[raw.connection](raw.data)
+            except MessageError as error:
+                self._misfit(raw.connection, error)
+                continue
+            yield RawMessage(raw.connection, raw.log_time_ns, raw.publish_time_ns, raw.sequence, data)
+
+    def _load(self, chunk: ChunkInfo, wanted: dict[int, Connection], progress: Progress | None) -> list[RawMessage]:
+        with self._path.open("rb") as stream:
+            found, _, problem = read_chunk(stream, self._size, chunk.offset)
+            if progress:
+                progress(stream.tell() - chunk.offset)
+        missing = sum(chunk.counts.values()) - len(found)
+        if missing or problem:
+            why = f" ({problem})" if problem else ""
+            self._lose(
+                f"the chunk at byte {chunk.offset}{why} lacks {missing} of {sum(chunk.counts.values())} messages"
+            )
+        orphans = sum(message.connection_id not in self._connections for message in found)
+        if orphans:
+            self._lose(f"{orphans} messages of the chunk at byte {chunk.offset} belong to no connection")
+        return [
+            RawMessage(connection, message.time_ns, message.time_ns, 0, message.data)
+            for message in found
+            if (connection := wanted.get(message.connection_id)) is not None
+        ]
+
+    def _conversion(self, connection: Connection) -> Convert:
+        convert = self._convert[connection]
+        if isinstance(convert, MessageError):
+            remedy = "leave the topic out with --topics"
+            raise RecordingError(f"{self._path}: topic {connection.topic}: {convert}; {remedy}") from convert
+        return convert
+
+    def _lose(self, text: str) -> None:
+        if text not in self.losses:
+            self.losses.append(text)
+
+    def _misfit(self, connection: Connection, error: MessageError) -> None:
+        """Tell of the first message of a topic that does not fit; the counts tell of the others."""
+        self._misfits[connection] += 1
+        if self._misfits[connection] == 1:
+            self._lose(f"{connection.topic}: {error}; such messages are left out")
+
+
+def _carried(described: BagConnection) -> tuple[Connection, Convert | MessageError]:
+    """The ROS 2 connection that stands for one of the bag, and what converts its messages or why nothing can."""
+    slash = "/" if described.topic.startswith("/") else ""
+    topic = slash + "/".join(part for part in described.topic.split("/") if part)
+    metadata = {KEY: qos_profile(latched=described.latched)}
+    try:
+        type_ = converted(described.ros_type, described.definition)
+    except MessageError as error:
+        return Connection(topic, described.ros_type.replace("/", "/msg/"), b"", metadata=metadata), error
+    return Connection(topic, type_.message_type, type_.definition.encode(), metadata=metadata), type_.convert
+
+
+SOURCE = Source("rosbag1", "ROS 1 bags (.bag)", NoConfig, recognises, open_bag)
