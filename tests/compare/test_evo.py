@@ -1,0 +1,92 @@
+"""Our figures against evo's, to 1e-6."""
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from toolkit.compare.metrics import Outcome, Reference, evaluate
+from toolkit.compare.trajectory import Pairs, Trajectory, nearest
+from toolkit.geometry.angles import quaternion_from_yaw
+from toolkit.geometry.se2 import compose
+
+EPOCH_NS = 1_288_971_842_000_000_000
+WITHIN_NS = 10_000_000
+
+
+class Figures(NamedTuple):
+    pairs: int
+    ape: float
+    rpe: float
+    heading_deg: float
+
+
+def ours(estimate: Trajectory, reference: Trajectory, *, aligned: bool) -> Figures:
+    def pairing(mine: Trajectory, theirs: Trajectory) -> Pairs:
+        return nearest(mine, theirs, WITHIN_NS)
+
+    found = evaluate(Outcome(estimate, len(estimate)), Reference(reference), pairing, aligned=aligned)
+    return Figures(found["scored"], found["position"]["rmse_m"], found["rpe"], found["heading"]["rmse_deg"])
+
+
+def evos(estimate: Trajectory, reference: Trajectory, *, aligned: bool) -> Figures:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from evo.core import metrics, sync
+        from evo.core.trajectory import PoseTrajectory3D
+
+    def to_evo(trajectory: Trajectory) -> PoseTrajectory3D:
+        quaternion = quaternion_from_yaw(trajectory.poses[:, 2])
+        positions = np.column_stack([trajectory.poses[:, :2], np.zeros(len(trajectory))])
+        return PoseTrajectory3D(positions, quaternion[:, [3, 0, 1, 2]], trajectory.time_ns / 1e9)
+
+    ref, est = sync.associate_trajectories(to_evo(reference), to_evo(estimate))
+    if aligned:
+        est.align(ref)
+    figures = []
+    for metric in (
+        metrics.APE(metrics.PoseRelation.translation_part),
+        metrics.RPE(metrics.PoseRelation.translation_part),
+        metrics.APE(metrics.PoseRelation.rotation_angle_deg),
+    ):
+        metric.process_data((ref, est))
+        figures.append(metric.get_statistic(metrics.StatisticsType.rmse))
+    return Figures(est.num_poses, *figures)
+
+
+def wander(seed: int, count: int, step_ns: int, jitter_ns: int) -> Trajectory:
+    rng = np.random.default_rng(seed)
+    moves = rng.normal([0.05, 0.0, 0.0], [0.02, 0.002, 0.05], (count, 3))
+    poses = np.zeros((count, 3))
+    for i in range(1, count):
+        poses[i] = compose(poses[i - 1], moves[i])
+    return Trajectory.of(EPOCH_NS + np.arange(count) * step_ns + rng.integers(0, jitter_ns, count), poses)
+
+
+def disturbed(truth: Trajectory, seed: int, every: int, delay_ns: int) -> Trajectory:
+    rng = np.random.default_rng(seed)
+    poses = compose(np.array([3.0, -7.0, 2.5]), truth.poses[::every]) + rng.normal(0, 0.05, truth.poses[::every].shape)
+    delays = rng.integers(-delay_ns, delay_ns, len(poses))
+    return Trajectory.of(truth.time_ns[::every] + delays, poses)
+
+
+@pytest.mark.parametrize("aligned", [False, True])
+@pytest.mark.parametrize(
+    ("every", "delay_ns"), [(1, 3_000_000), (7, 3_000_000), (3, 15_000_000)], ids=["dense", "sparse", "late"]
+)
+def test_nearest_gives_evos_figures(every: int, delay_ns: int, aligned: bool) -> None:
+    truth = wander(1, 600, 33_000_000, 4_000_000)
+    estimate = disturbed(truth, 2, every, delay_ns)
+    mine, theirs = ours(estimate, truth, aligned=aligned), evos(estimate, truth, aligned=aligned)
+    assert mine.pairs > 50
+    assert mine == pytest.approx(theirs, abs=1e-6)
+
+
+@pytest.mark.parametrize("aligned", [False, True])
+def test_a_sparser_reference_is_paired_evos_way_too(aligned: bool) -> None:
+    dense = wander(3, 600, 33_000_000, 4_000_000)
+    sparse = disturbed(dense, 4, 5, 8_000_000)
+    mine, theirs = ours(dense, sparse, aligned=aligned), evos(dense, sparse, aligned=aligned)
+    assert mine.pairs > 50
+    assert mine == pytest.approx(theirs, abs=1e-6)

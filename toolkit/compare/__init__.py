@@ -1,0 +1,1 @@
+"""Accuracy: trajectories and maps against a reference; pure on arrays but for one file."""
