@@ -1,0 +1,189 @@
+"""Which observations show the same landmark, while a robot with drifting odometry passes many that look alike.
+
+An EKF over the robot's pose and every landmark (Dissanayake et al. 2001) keeps the covariances that gates need: small
+towards what was just seen, wide towards what was left long ago. Only labels are taken from it; the graph does the rest.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+from scipy.stats import chi2
+
+from toolkit.geometry.se2 import Array, between, compose, rotation, transform_points
+
+_FAR = 1e9
+UNLABELLED = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Gates:
+    """Squared Mahalanobis distances (2 degrees of freedom): below `same` it may be the landmark, above `new` it is not.
+
+    Between the two an observation is evidence for neither and stays unlabelled.
+    """
+
+    same: float = float(chi2.ppf(0.999, 2))
+    new: float = 2 * float(chi2.ppf(0.9999, 2))
+
+
+class LandmarkFilter:
+    """EKF of one robot: state pose and landmarks, in the frame of its odometry."""
+
+    def __init__(self, start: Array, gates: Gates) -> None:
+        self.mean: Array = np.array(start, dtype=np.float64)
+        self.covariance: Array = np.zeros((3, 3))
+        self.kinds: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self._gates = gates
+
+    def move(self, step: Array, step_covariance: Array) -> None:
+        """Follow the odometry's step (3,) in the base frame, with covariance (3, 3)."""
+        pose = self.mean[:3]
+        turn = rotation(pose[2])
+        jacobian = np.eye(3)
+        jacobian[:2, 2] = turn @ np.array([-step[1], step[0]])
+        noise = np.eye(3)
+        noise[:2, :2] = turn
+        self.mean[:3] = compose(pose, step)
+        cross = jacobian @ self.covariance[:3]
+        self.covariance[:3], self.covariance[:, :3] = cross, cross.T
+        self.covariance[:3, :3] = cross[:, :3] @ jacobian.T + noise @ step_covariance @ noise.T
+
+    def see(self, kinds: NDArray[np.int64], points_xy: Array, covariances: Array) -> NDArray[np.int64]:
+        """Label (K,) each object of one bundle with a landmark's number, new ones included; learn from it.
+
+        kinds (K,) are numbers of classes, points_xy (K, 2) and covariances (K, 2, 2) are in the base frame.
+        """
+        labels = np.full(len(kinds), UNLABELLED, dtype=np.int64)
+        distances = np.full((len(kinds), len(self.kinds)), _FAR)
+        for i, (kind, point, covariance) in enumerate(zip(kinds, points_xy, covariances, strict=True)):
+            candidates = np.flatnonzero(self.kinds == kind)
+            if len(candidates):
+                distances[i, candidates] = self._distances(candidates, point, covariance)
+        rows, columns = self._assign(distances)
+        rows, columns = self._jointly(rows, columns, points_xy, covariances)
+        labels[rows] = columns
+        if len(rows):
+            self._update(columns, points_xy[rows], covariances[rows])
+        fresh = (labels == UNLABELLED) & (distances.min(axis=1, initial=_FAR) > self._gates.new)
+        for row in np.flatnonzero(fresh):
+            labels[row] = self._insert(int(kinds[row]), points_xy[row], covariances[row])
+        return labels
+
+    def _predict(self, landmark: int) -> tuple[Array, Array, NDArray[np.int64]]:
+        """Landmark (2,) in the base frame, its Jacobian (2, 5) by pose and landmark, and their places in the state."""
+        pose = self.mean[:3]
+        back = rotation(pose[2]).T
+        point = back @ (self.mean[3 + 2 * landmark : 5 + 2 * landmark] - pose[:2])
+        jacobian = np.column_stack([-back, np.array([point[1], -point[0]]), back])
+        return point, jacobian, np.array([0, 1, 2, 3 + 2 * landmark, 4 + 2 * landmark])
+
+    def _distances(self, candidates: NDArray[np.int64], point: Array, covariance: Array) -> Array:
+        """Squared Mahalanobis distance (C,) of one observation to each of C landmarks."""
+        pose, count = self.mean[:3], len(candidates)
+        columns = np.column_stack([np.tile([0, 1, 2], (count, 1)), 3 + 2 * candidates, 4 + 2 * candidates])
+        back = rotation(pose[2]).T
+        predicted = (self.mean[columns[:, 3:]] - pose[:2]) @ back.T
+        jacobian = np.zeros((count, 2, 5))
+        jacobian[:, :, :2], jacobian[:, :, 3:] = -back, back
+        jacobian[:, 0, 2], jacobian[:, 1, 2] = predicted[:, 1], -predicted[:, 0]
+        state = self.covariance[columns[:, :, None], columns[:, None, :]]
+        spread = jacobian @ state @ jacobian.swapaxes(1, 2) + covariance
+        miss = point - predicted
+        squared: Array = np.einsum("ci,ci->c", miss, np.linalg.solve(spread, miss[..., None])[..., 0])
+        return squared
+
+    def _assign(self, distances: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """One landmark per object and one object per landmark, as many as the gate lets, with the least total."""
+        if not distances.size:
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        rows, columns = linear_sum_assignment(np.minimum(distances, 10 * self._gates.same))
+        keep = distances[rows, columns] <= self._gates.same
+        return rows[keep], columns[keep]
+
+    def _jointly(
+        self, rows: NDArray[np.int64], columns: NDArray[np.int64], points_xy: Array, covariances: Array
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """The pairs that fit together (joint compatibility, Neira and Tardos 2001); the worst leaves until all do."""
+        while len(rows) > 1:
+            miss, jacobian, noise = self._stack(columns, points_xy[rows], covariances[rows])
+            spread = jacobian @ self.covariance @ jacobian.T + noise
+            solved = np.linalg.solve(spread, miss)
+            if miss @ solved <= chi2.ppf(0.999, len(miss)):
+                break
+            worst = int(np.argmax(_saved_by_leaving_out(solved, np.linalg.inv(spread))))
+            rows, columns = np.delete(rows, worst), np.delete(columns, worst)
+        return rows, columns
+
+    def _stack(self, landmarks: NDArray[np.int64], points_xy: Array, covariances: Array) -> tuple[Array, Array, Array]:
+        k = len(landmarks)
+        miss, jacobian, noise = np.empty(2 * k), np.zeros((2 * k, len(self.mean))), np.zeros((2 * k, 2 * k))
+        for i, landmark in enumerate(landmarks):
+            predicted, block, columns = self._predict(int(landmark))
+            part = slice(2 * i, 2 * i + 2)
+            miss[part] = points_xy[i] - predicted
+            jacobian[part, columns] = block
+            noise[part, part] = covariances[i]
+        return miss, jacobian, noise
+
+    def _update(self, landmarks: NDArray[np.int64], points_xy: Array, covariances: Array) -> None:
+        miss, jacobian, noise = self._stack(landmarks, points_xy, covariances)
+        cross = self.covariance @ jacobian.T
+        gain = np.linalg.solve(jacobian @ cross + noise, cross.T).T
+        self.mean = self.mean + gain @ miss
+        self.covariance = self.covariance - gain @ cross.T
+        self.covariance = (self.covariance + self.covariance.T) / 2
+
+    def _insert(self, kind: int, point: Array, covariance: Array) -> int:
+        pose, n = self.mean[:3], len(self.mean)
+        turn = rotation(pose[2])
+        by_pose = np.column_stack([np.eye(2), turn @ np.array([-point[1], point[0]])])
+        cross = by_pose @ self.covariance[:3]
+        grown = np.zeros((n + 2, n + 2))
+        grown[:n, :n] = self.covariance
+        grown[n:, :n], grown[:n, n:] = cross, cross.T
+        grown[n:, n:] = cross[:, :3] @ by_pose.T + turn @ covariance @ turn.T
+        self.mean = np.concatenate([self.mean, transform_points(pose, point)])
+        self.covariance = grown
+        self.kinds = np.append(self.kinds, kind)
+        return len(self.kinds) - 1
+
+
+def _saved_by_leaving_out(solved: NDArray[np.floating], inverse: NDArray[np.floating]) -> Array:
+    """How much the squared distance falls (K,) if one of K pairs is left out: its part of S^-1 m, over that of S^-1."""
+    parts = solved.reshape(-1, 2)
+    k = np.arange(len(parts))
+    blocks = inverse.reshape(len(parts), 2, len(parts), 2)[k, :, k, :]
+    saved: Array = np.einsum("ki,ki->k", parts, np.linalg.solve(blocks, parts[..., None])[..., 0])
+    return saved
+
+
+def label_observations(
+    odom_from_base: Array,
+    step_covariances: Array,
+    bundle: NDArray[np.int64],
+    kinds: NDArray[np.int64],
+    points_xy: Array,
+    covariances: Array,
+    gates: Gates = Gates(),
+) -> tuple[NDArray[np.int64], Array]:
+    """Landmark number (N,) of each of N observations (`UNLABELLED` where unclear), and the filter's poses (T, 3).
+
+    odom_from_base (T, 3) with covariances (T - 1, 3, 3) of the steps between, in the base frame of each step's start;
+    `bundle` (N,) rises and says in which of T each was seen; kinds (N,) are class numbers; points_xy (N, 2) and
+    covariances (N, 2, 2) are in the base frame.
+    """
+    state = LandmarkFilter(odom_from_base[0], gates)
+    steps = between(odom_from_base[:-1], odom_from_base[1:])
+    bounds = np.searchsorted(bundle, np.arange(len(odom_from_base) + 1))
+    labels = np.full(len(bundle), UNLABELLED, dtype=np.int64)
+    poses = np.empty((len(odom_from_base), 3))
+    for t in range(len(odom_from_base)):
+        if t:
+            state.move(steps[t - 1], step_covariances[t - 1])
+        rows = slice(bounds[t], bounds[t + 1])
+        if bounds[t] < bounds[t + 1]:
+            labels[rows] = state.see(kinds[rows], points_xy[rows], covariances[rows])
+        poses[t] = state.mean[:3]
+    return labels, poses
