@@ -10,13 +10,16 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from toolkit.errors import UsageError
+from toolkit.sources import source_names
 from toolkit.stages import find_stage, stage_names
 
 Settings = dict[str, dict[str, Any]]
 
 
 def gather(file: Path | None, settings: Sequence[str], method: str | None) -> Settings:
-    """Settings by stage from a TOML file, then `STAGE.KEY=VALUE` texts over it; `method` counts for every stage.
+    """Settings by stage or source from a TOML file, then `STAGE.KEY=VALUE` texts over it.
+
+    `method` counts for every stage.
 
     Raises:
         UsageError: the file or a setting cannot be read, or names a stage that does not exist.
@@ -29,7 +32,7 @@ def gather(file: Path | None, settings: Sequence[str], method: str | None) -> Se
             raise UsageError(f"--set {text}: write STAGE.KEY=VALUE, such as localize.max_sigma_m=0.3")
         gathered.setdefault(stage, {})[key] = _value(value)
     for stage in gathered:
-        _known(stage, stage_names(), "stage")
+        _known(stage, (*stage_names(), *source_names()), "stage or source")
     if method is not None:
         for stage in stage_names():
             gathered.setdefault(stage, {}).setdefault("method", method)

@@ -18,9 +18,9 @@ from toolkit.messages.poses import Odometry, PoseStamped
 from toolkit.messages.qos import KEY, qos_profile
 from toolkit.messages.scene import SceneObjects
 from toolkit.messages.typestore import definition
-from toolkit.sources.merge import merge
-from toolkit.sources.mrclam_files import DataSet, Table, file_names, keep, open_data_set
-from toolkit.sources.mrclam_robot import (
+from toolkit.sources._merge import merge
+from toolkit.sources._mrclam_files import DataSet, Table, file_names, keep, open_data_set
+from toolkit.sources._mrclam_robot import (
     FIRST_LANDMARK,
     MrclamConfig,
     clean_odometry,
@@ -28,7 +28,7 @@ from toolkit.sources.mrclam_robot import (
     odometry_covariance,
     scans,
 )
-from toolkit.sources.source import Progress, Source, SourceLog
+from toolkit.sources._shape import Progress, Source, SourceLog
 from toolkit.stage import Channel, ChannelSummary, Connection, RawMessage
 
 _BARCODES, _LANDMARKS = "Barcodes.dat", "Landmark_Groundtruth.dat"

@@ -8,11 +8,11 @@ from pathlib import Path
 
 from toolkit.errors import MessageError, RecordingError
 from toolkit.messages.qos import KEY, qos_profile
-from toolkit.sources.bag_container import MAGIC, BagConnection, ChunkInfo, DamagedBagError
-from toolkit.sources.bag_index import BagIndex, read_chunk, read_index
-from toolkit.sources.merge import merge
-from toolkit.sources.ros1_types import Convert, converted
-from toolkit.sources.source import NoConfig, Progress, Source, SourceLog
+from toolkit.sources._bag_container import MAGIC, BagConnection, ChunkInfo, DamagedBagError
+from toolkit.sources._bag_index import BagIndex, read_chunk, read_index
+from toolkit.sources._merge import merge
+from toolkit.sources._ros1_types import Convert, converted
+from toolkit.sources._shape import NoConfig, Progress, Source, SourceLog
 from toolkit.stage import ChannelSummary, Connection, RawMessage
 
 
@@ -50,7 +50,7 @@ class BagLog:
     """The log in a bag. Connections that differ only in their publisher share one channel."""
 
     def __init__(self, path: Path, size: int, index: BagIndex) -> None:
-        self.losses = index.losses
+        self.losses = [f"{path.name}: {loss}" for loss in index.losses]
         self._path, self._size, self._chunks = path, size, [chunk for chunk in index.chunks if chunk.counts]
         self._connections: dict[int, Connection] = {}
         self._convert: dict[Connection, Convert | MessageError] = {}
@@ -122,6 +122,7 @@ class BagLog:
         return convert
 
     def _lose(self, text: str) -> None:
+        text = f"{self._path.name}: {text}"
         if text not in self.losses:
             self.losses.append(text)
 

@@ -13,9 +13,10 @@ from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
 from toolkit.errors import RecordingError
-from toolkit.sources.db3 import ZSTD_MAGIC, Db3Log, unpacked
-from toolkit.sources.ros2_types import check_distribution, known_distribution
-from toolkit.sources.source import Log, McapFile, Source, SourceLog
+from toolkit.sources._db3 import ZSTD_MAGIC, Db3Log
+from toolkit.sources._mcap import carry
+from toolkit.sources._ros2_types import check_distribution, known_distribution
+from toolkit.sources._shape import Log, McapFile, Source, SourceLog
 
 _SUFFIXES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 _MAGICS = (b"SQLite format 3\0", b"\x89MCAP0\r\n")
@@ -79,7 +80,7 @@ def _part(plain: Path, file: Path, distribution: str | None) -> Log | McapFile:
     if start.startswith(_MAGICS[0]):
         return Db3Log(plain, distribution)
     if start.startswith(_MAGICS[1]):
-        return McapFile(plain, unpacked)
+        return McapFile(plain, carry)
     kind = "an SQLite" if ".db3" in file.name else "an MCAP"
     raise RecordingError(f"{file} is not {kind} file, whatever its name says; check or copy it again")
 

@@ -13,8 +13,8 @@ import zstandard
 
 from toolkit.errors import MessageError, RecordingError
 from toolkit.messages.qos import KEY
-from toolkit.sources.ros2_types import check_fits, definition_in, known_distribution
-from toolkit.sources.source import Progress
+from toolkit.sources._ros2_types import check_fits, definition_in, known_distribution
+from toolkit.sources._shape import Progress
 from toolkit.stage import ChannelSummary, Connection, RawMessage
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
@@ -139,7 +139,7 @@ class Db3Log:
         try:
             payload = unpacked(data)
         except MessageError as error:
-            loss = f"{connection.topic}: {error}; such messages are left out"
+            loss = f"{self._path.name}: {connection.topic}: {error}; such messages are left out"
             if loss not in self.losses:
                 self.losses.append(loss)
             return None
@@ -218,11 +218,14 @@ def _topic(row: dict[str, str], definitions: dict[str, tuple[str, str]], distrib
         return _Topic(Connection(name, message_type, text.encode(), encoding, metadata=metadata), None, problem)
     text_or_none = definition_in(distribution, message_type) if distribution else None
     if problem is None and text_or_none is None:
-        where = f"neither it nor {distribution} has" if distribution else "it has no definition of the type and no"
+        who = (
+            f"neither the file nor {distribution} has"
+            if distribution
+            else "the file, which names no distribution, lacks"
+        )
         problem = (
-            f"topic {name}: {message_type}: {where} "
-            f"{'the definition' if distribution else 'distribution'}; name the distribution it was recorded with: "
-            "--distro NAME (such as humble), or leave the topic out with --topics"
+            f"topic {name}: {who} the definition of {message_type}; name the distribution it was recorded with, such "
+            "as --distro humble, or leave the topic out with --topics"
         )
     return _Topic(
         Connection(name, message_type, (text_or_none or "").encode(), metadata=metadata), distribution, problem

@@ -9,6 +9,7 @@ from typing import Any, Protocol
 from toolkit.stage import ChannelSummary, Connection, RawMessage
 
 Progress = Callable[[int], None]
+Payload = bytes | memoryview
 
 
 class Log(Protocol):
@@ -47,14 +48,25 @@ class Log(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
+class Carried:
+    """The ROS 2 connection that stands for another one, and what makes its payloads CDR.
+
+    `convert` raises MessageError for a payload that cannot be understood.
+    """
+
+    connection: Connection
+    convert: Callable[[Payload], Payload]
+
+
+@dataclass(frozen=True, slots=True)
 class McapFile:
     """A part of a log that is an MCAP file, which sources do not open.
 
-    unpack: what to do to every payload, None for nothing.
+    carry: how a connection of the file is carried on, None if it cannot be.
     """
 
     path: Path
-    unpack: Callable[[bytes | memoryview], bytes | memoryview] | None = None
+    carry: Callable[[Connection], Carried | None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,8 @@ from rosbags.typesys.store import Typestore
 
 from toolkit.errors import MessageError
 from toolkit.messages.typestore import definition, typestore
+from toolkit.sources._shape import Payload
 
-Payload = bytes | memoryview
 Convert = Callable[[Payload], Payload]
 Description = Any  # a field type of rosbags: (kind, content), nested
 Fields = list[tuple[str, Description]]

@@ -4,8 +4,8 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
-from toolkit.sources import bag_container as container
-from toolkit.sources.bag_container import BagConnection, BagMessage, ChunkInfo, DamagedBagError
+from toolkit.sources import _bag_container as container
+from toolkit.sources._bag_container import BagConnection, BagMessage, ChunkInfo, DamagedBagError
 
 
 @dataclass(slots=True)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from toolkit.geometry.angles import wrap
 from toolkit.geometry.se2 import exp, rotation
-from toolkit.sources.mrclam_files import Array, Table, keep
+from toolkit.sources._mrclam_files import Array, Table, keep
 
 FIRST_LANDMARK = 6  # subjects 1 to 5 are the robots
 
