@@ -18,7 +18,15 @@ def _expected(records: list[dict]) -> tuple[list[tuple], list[str], set[str], in
             topics[fields["id"]] = fields["topic"]
         elif kind == "Message":
             data = bytes(int(byte) for byte in fields["data"])
-            messages.append((fields["channel_id"], int(fields["log_time"]), int(fields["publish_time"]), int(fields["sequence"]), data))
+            messages.append(
+                (
+                    fields["channel_id"],
+                    int(fields["log_time"]),
+                    int(fields["publish_time"]),
+                    int(fields["sequence"]),
+                    data,
+                )
+            )
         elif kind == "Metadata":
             metadata.add(fields["name"])
         elif kind == "Attachment":
@@ -35,7 +43,10 @@ def test_every_file_of_the_suite(shared_data: Path, tmp_path: Path) -> None:
             path.write_bytes(suite.read(name))
             messages, topics, metadata, attachments = _expected(json.loads(suite.read(name[:-5] + ".json"))["records"])
             with open_recording(path) as recording:
-                found = [(m.connection.topic, m.log_time_ns, m.publish_time_ns, m.sequence, bytes(m.data)) for m in recording.messages()]
+                found = [
+                    (m.connection.topic, m.log_time_ns, m.publish_time_ns, m.sequence, bytes(m.data))
+                    for m in recording.messages()
+                ]
                 assert found == sorted(messages, key=lambda message: message[1]), name
                 assert sorted(entry.connection.topic for entry in recording.channels) == topics, name
                 assert sum(entry.count for entry in recording.channels) == len(messages), name

@@ -1,0 +1,109 @@
+"""Hypothesis strategies for every message dataclass."""
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from toolkit.messages.annotations import ImageAnnotations, Label, Outline
+from toolkit.messages.detections import Detections
+from toolkit.messages.images import CameraInfo, CompressedImage, Image
+from toolkit.messages.markers import Marker, MarkerArray, Shape
+from toolkit.messages.match import LandmarkMatch, Status
+from toolkit.messages.numbers import UInt8
+from toolkit.messages.poses import Odometry, Path, PoseStamped, PoseWithCovarianceStamped
+from toolkit.messages.scan import LaserScan
+from toolkit.messages.scene import SceneObjects
+from toolkit.messages.transforms import TFMessage, Transform
+
+number = st.floats(-1e6, 1e6)
+anything = st.floats(width=64)
+stamp = st.integers(0, 2**31 * 10**9 - 1)
+text = st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), max_size=12)
+color = st.tuples(*[st.floats(0, 1, width=32)] * 4)
+
+
+def vector(*shape: int, elements: st.SearchStrategy[float] = anything) -> st.SearchStrategy[np.ndarray]:
+    return arrays(np.float64, shape, elements=elements)
+
+
+scan_ranges = st.integers(0, 20).flatmap(lambda n: arrays(np.float32, (n,), elements=st.floats(width=32)))
+single = st.floats(width=32, allow_nan=False)
+hypotheses = st.lists(st.tuples(text, number), max_size=3).map(tuple)
+pose_stamped = st.builds(PoseStamped, stamp, text, vector(3), vector(4))
+transform = st.builds(Transform, stamp, text, text, vector(3), vector(4))
+
+
+@st.composite
+def scene_objects(draw: st.DrawFn) -> SceneObjects:
+    n = draw(st.integers(0, 4))
+    classes = draw(st.lists(hypotheses.filter(len), min_size=n, max_size=n).map(tuple))
+    ids = draw(st.lists(text, min_size=n, max_size=n).map(tuple))
+    radii = draw(vector(n, elements=st.floats(0, 100)))
+    return SceneObjects(draw(stamp), draw(text), ids, classes, draw(vector(n, 2)), draw(vector(n, 2, 2)), radii)
+
+
+@st.composite
+def detections(draw: st.DrawFn) -> Detections:
+    n = draw(st.integers(0, 4))
+    found = draw(st.lists(hypotheses, min_size=n, max_size=n).map(tuple))
+    ids = draw(st.lists(text, min_size=n, max_size=n).map(tuple))
+    corner, size = draw(vector(n, 2, elements=st.integers(0, 999))), draw(vector(n, 2, elements=st.integers(0, 999)))
+    return Detections(draw(stamp), draw(text), ids, found, np.hstack([corner, corner + size]))
+
+
+@st.composite
+def annotations(draw: st.DrawFn) -> ImageAnnotations:
+    outline = st.builds(Outline, vector(3, 2), color, number)
+    label = st.builds(Label, st.tuples(number, number), text, number, color, color)
+    outlines = draw(st.lists(outline, min_size=1, max_size=2).map(tuple))
+    return ImageAnnotations(draw(stamp), outlines, draw(st.lists(label, max_size=2).map(tuple)))
+
+
+marker = st.builds(
+    Marker, text, st.integers(0, 9), st.sampled_from(Shape), vector(3), vector(3), color, text, vector(2, 3)
+)
+match = st.builds(
+    LandmarkMatch,
+    stamp,
+    text,
+    st.sampled_from(Status),
+    st.lists(text, max_size=3).map(tuple),
+    st.lists(text, max_size=3).map(tuple),
+    vector(3),
+    st.lists(text, max_size=3).map(tuple),
+    vector(2),
+    number,
+    number,
+    st.integers(0, 99),
+    st.integers(0, 99),
+)
+MESSAGES = st.one_of(
+    pose_stamped,
+    st.builds(PoseWithCovarianceStamped, stamp, text, vector(3), vector(4), vector(6, 6)),
+    st.builds(Path, stamp, text, st.lists(pose_stamped, max_size=3).map(tuple)),
+    st.builds(Odometry, stamp, text, text, vector(3), vector(4), vector(6, 6), vector(3), vector(3), vector(6, 6)),
+    st.builds(TFMessage, st.lists(transform, max_size=3).map(tuple)),
+    st.builds(LaserScan, stamp, text, *[single] * 7, scan_ranges, scan_ranges),
+    st.builds(CompressedImage, stamp, text, text, st.binary(max_size=30)),
+    st.builds(
+        Image, stamp, text, st.integers(0, 9), st.integers(0, 9), text, st.booleans(), st.integers(0, 9), st.binary()
+    ),
+    st.builds(
+        CameraInfo,
+        stamp,
+        text,
+        st.integers(0, 9),
+        st.integers(0, 9),
+        text,
+        vector(5),
+        vector(3, 3),
+        vector(3, 3),
+        vector(3, 4),
+    ),
+    scene_objects(),
+    detections(),
+    annotations(),
+    st.builds(MarkerArray, stamp, text, st.lists(marker, min_size=1, max_size=3).map(tuple)),
+    match,
+    st.builds(UInt8, st.integers(0, 255)),
+)
