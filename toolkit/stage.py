@@ -64,12 +64,15 @@ class Stamped:
 class OdometryAt:
     """Odometry at one moment: odom_from_base (3,) x, y, heading in `frame_id`, and the (3, 3) covariance it came with.
 
-    The covariance is that of the message before; all zero where the log leaves it unknown.
+    The covariance is that of the message before; all zero where the log leaves it unknown. `way_m` and `turned_rad` are
+    the length of the path and the sum of all turning since the log began, so that a loop back to the start counts.
     """
 
     frame_id: str
     odom_from_base: Array
     covariance: Array
+    way_m: float
+    turned_rad: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)

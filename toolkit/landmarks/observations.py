@@ -12,8 +12,8 @@ from toolkit.geometry.se2 import Array
 class LogObservations:
     """T bundles that have odometry and N objects seen in them.
 
-    stamps_ns, log_times_ns (T,) rise; odom_from_base (T, 3) and its covariance (T, 3, 3) as the log gives it. Objects:
-    `bundle` (N,) rises and says in which one each was seen, `classes` its most probable class, points_xy (N, 2) in the
+    stamps_ns, log_times_ns (T,) rise; odom_from_base (T, 3), with the way_m (T,) and turned_rad (T,) up to there.
+    Objects: `bundle` (N,) rises and says in which one each was seen, `classes` its most probable class, points_xy (N, 2) in the
     base frame with covariances (N, 2, 2) m^2, radii_m (N,), zero where unknown. `bundles` counts those without
     odometry too.
     """
@@ -21,7 +21,8 @@ class LogObservations:
     stamps_ns: NDArray[np.int64]
     log_times_ns: NDArray[np.int64]
     odom_from_base: Array
-    odometry_covariance: Array
+    way_m: Array
+    turned_rad: Array
     bundle: NDArray[np.int64]
     classes: tuple[str, ...]
     points_xy: Array

@@ -1,5 +1,6 @@
 """Time association: messages of several channels to bundles, in one pass over a recording and in bounded memory."""
 
+import math
 from bisect import bisect_left
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -8,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.geometry.se2 import Array, interpolate
+from toolkit.geometry.se2 import between, interpolate
 from toolkit.messages.codec import Message
 from toolkit.messages.poses import Odometry
 from toolkit.stage import Bundle, Channel, OdometryAt
@@ -35,9 +36,7 @@ class _Trail:
     def __init__(self, counts: Association) -> None:
         self._counts = counts
         self._stamps: deque[int] = deque()
-        self._poses: deque[Array] = deque()
-        self._covariances: deque[Array] = deque()
-        self._frame_id = ""
+        self._steps: deque[OdometryAt] = deque()
 
     @property
     def latest_ns(self) -> int:
@@ -51,28 +50,37 @@ class _Trail:
         if stamp_ns <= self.latest_ns:
             self._counts.odometry_out_of_order += 1
             return
+        way_m = turned_rad = 0.0
+        if self._steps:
+            last = self._steps[-1]
+            forward, left, turn = between(last.odom_from_base, pose).tolist()
+            way_m, turned_rad = last.way_m + math.hypot(forward, left), last.turned_rad + abs(turn)
         self._stamps.append(stamp_ns)
-        self._poses.append(pose)
-        self._covariances.append(message.planar_covariance)
-        self._frame_id = message.frame_id
+        self._steps.append(OdometryAt(message.frame_id, pose, message.planar_covariance, way_m, turned_rad))
         while self._stamps[0] < stamp_ns - _KEPT_NS and len(self._stamps) > 2:
             self._stamps.popleft()
-            self._poses.popleft()
-            self._covariances.popleft()
+            self._steps.popleft()
 
     def at(self, stamp_ns: int) -> OdometryAt | None:
         """Odometry at a time between two stamps that are close enough together, else None."""
         right = bisect_left(self._stamps, stamp_ns)
         if right == len(self._stamps):
             return None
+        after = self._steps[right]
         if self._stamps[right] == stamp_ns:
-            return OdometryAt(self._frame_id, self._poses[right], self._covariances[right])
+            return after
         if right == 0 or self._stamps[right] - self._stamps[right - 1] > WINDOW_NS:
             return None
-        times = np.array([self._stamps[right - 1], self._stamps[right]], dtype=np.int64)
-        poses = np.stack([self._poses[right - 1], self._poses[right]])
-        pose = interpolate(times, poses, np.array([stamp_ns], dtype=np.int64))[0]
-        return OdometryAt(self._frame_id, pose, self._covariances[right - 1])
+        before, times = self._steps[right - 1], np.array([self._stamps[right - 1], self._stamps[right]], dtype=np.int64)
+        poses = np.stack([before.odom_from_base, after.odom_from_base])
+        share = (stamp_ns - self._stamps[right - 1]) / (self._stamps[right] - self._stamps[right - 1])
+        return OdometryAt(
+            before.frame_id,
+            interpolate(times, poses, np.array([stamp_ns], dtype=np.int64))[0],
+            before.covariance,
+            before.way_m + share * (after.way_m - before.way_m),
+            before.turned_rad + share * (after.turned_rad - before.turned_rad),
+        )
 
 
 def associate(
