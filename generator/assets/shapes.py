@@ -37,18 +37,21 @@ def surface(points: Floats, material: str, uv: Floats | None = None) -> Solid:
     return without_slivers(Solid(points.reshape(-1, 3), np.asarray(uv, float).reshape(-1, 2), faces, material))
 
 
-def loft(rings: ArrayLike, material: str) -> Solid:
+def loft(rings: ArrayLike, material: str, u: ArrayLike | None = None, v: ArrayLike | None = None) -> Solid:
     """A skin over rings (K,N,3), each counter-clockwise about the direction in which they follow, closed at both ends.
 
-    The texture's u runs around the rings, v along them by length (caps included).
+    The texture's `u` (N+1,) runs around the rings, `v` (K,) along them; by default evenly, and by length with the ends.
     """
     open_rings = np.asarray(rings, float)
     capped = np.concatenate([_shrunk(open_rings[:1]), open_rings, _shrunk(open_rings[-1:])])
     closed = np.concatenate([capped, capped[:, :1]], axis=1)
-    steps = np.linalg.norm(np.diff(closed, axis=0), axis=2).mean(axis=1)
-    v = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
-    u = np.linspace(0.0, 1.0, closed.shape[1])
-    return surface(closed, material, np.stack(np.broadcast_arrays(u[None, :], v[:, None]), axis=-1))
+    if v is None:
+        steps = np.linalg.norm(np.diff(closed, axis=0), axis=2).mean(axis=1)
+        along = np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum()
+    else:
+        along = np.pad(np.asarray(v, float), 1, mode="edge")
+    around = np.linspace(0.0, 1.0, closed.shape[1]) if u is None else np.asarray(u, float)
+    return surface(closed, material, np.stack(np.broadcast_arrays(around[None, :], along[:, None]), axis=-1))
 
 
 def _shrunk(rings: Floats) -> Floats:
