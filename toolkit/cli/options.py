@@ -1,5 +1,6 @@
 """Options that several verbs take, so that they read alike everywhere."""
 
+import re
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
@@ -48,4 +49,5 @@ def time_ns(text: str | None, option: str) -> int | None:
     if moment is None or moment.tzinfo is None:
         raise UsageError(f"{option} {text}: give RFC 3339 with an offset, such as 2026-01-31T12:00:00Z, or nanoseconds")
     whole = moment.replace(microsecond=0)
-    return int(whole.timestamp()) * 10**9 + moment.microsecond * 1000
+    fraction = re.search(r"[.,](\d+)", text)  # datetime keeps microseconds only
+    return int(whole.timestamp()) * 10**9 + (int(fraction[1].ljust(9, "0")[:9]) if fraction else 0)

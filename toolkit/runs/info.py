@@ -1,0 +1,113 @@
+"""What a log holds: its channels, which roles they play, and which verbs can use it."""
+
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from toolkit.channels import MAP_POSE, MATCH, POSE, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
+from toolkit.recording.reader import Recording, open_recording
+from toolkit.runs.config import Settings
+from toolkit.runs.inputs import ROLES, topics_for
+from toolkit.runs.logs import McapLog, OpenLog, open_logs
+from toolkit.sources import Log
+
+TRUTH, RESULTS = "truth", "results"
+_BY_TOPIC = {
+    TRUTH: (TRUTH_POSE.topic, TRUTH_OBJECTS.topic, TRUTH_DETECTIONS.topic),
+    RESULTS: (MATCH.topic, POSE.topic, MAP_POSE.topic),
+}
+NEEDS: Mapping[str, tuple[str, ...]] = {
+    "map": ("scene_objects", "odometry"),
+    "localize": ("scene_objects",),
+    "evaluate": (RESULTS, TRUTH),
+}
+"""The roles that each verb cannot do without."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelInfo:
+    """A topic with one type: messages, their mean rate over the log (None below two), and the role it plays."""
+
+    topic: str
+    message_type: str
+    count: int
+    rate_hz: float | None
+    role: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class LogInfo:
+    """One log. `name` tells the logs of one path apart, `roles` are topics by role, `missing` roles by verb."""
+
+    path: Path
+    name: str
+    profile: str
+    start_ns: int | None
+    end_ns: int | None
+    channels: tuple[ChannelInfo, ...]
+    roles: Mapping[str, list[str]]
+    verbs: tuple[str, ...]
+    missing: Mapping[str, list[str]]
+    losses: tuple[str, ...] = field(default=())
+
+
+def describe(path: Path, settings: Settings) -> list[LogInfo]:
+    """The logs at a path: a recording, a bag or a data set.
+
+    Raises:
+        RecordingError: it cannot be read.
+    """
+    with open_logs(path, settings) as logs:
+        described = []
+        for log in logs:
+            if path.is_file() and len(log.parts) == 1 and isinstance(log.parts[0], McapLog):
+                with open_recording(path) as recording:  # also the channels that cannot be converted
+                    described.append(_describe(log, recording.profile, [recording], recording.losses))
+            else:
+                losses = [*log.losses, *(loss for part in log.parts for loss in part.losses)]
+                described.append(_describe(log, _profile(log), log.parts, losses))
+        return described
+
+
+def _profile(log: OpenLog) -> str:
+    profiles = {part.profile for part in log.parts if isinstance(part, McapLog)}
+    if profiles:
+        return min(profiles)
+    return {"rosbag1": "ros1", "rosbag2": "ros2"}.get(log.source, "")
+
+
+def _describe(log: OpenLog, profile: str, parts: Sequence[Log | Recording], losses: Sequence[str]) -> LogInfo:
+    counts: Counter[tuple[str, str]] = Counter()
+    for part in parts:
+        for entry in part.channels:
+            counts[entry.connection.topic, entry.connection.message_type] += entry.count
+    seconds = (log.end_ns - log.start_ns) * 1e-9 if log.start_ns is not None and log.end_ns is not None else 0.0
+    roles = _roles([key for key, count in counts.items() if count])
+    role_of = {topic: role for role, topics in roles.items() for topic in topics}
+    channels = tuple(
+        ChannelInfo(topic, kind, count, count / seconds if seconds > 0 and count > 1 else None, role_of.get(topic))
+        for (topic, kind), count in sorted(counts.items())
+    )
+    missing = {verb: [role for role in needs if not roles.get(role)] for verb, needs in NEEDS.items()}
+    return LogInfo(
+        log.path,
+        log.name,
+        profile,
+        log.start_ns,
+        log.end_ns,
+        channels,
+        {role: topics for role, topics in roles.items() if role != RESULTS},
+        tuple(verb for verb, lacks in missing.items() if not lacks),
+        {verb: lacks for verb, lacks in missing.items() if lacks},
+        tuple(losses),
+    )
+
+
+def _roles(present: Collection[tuple[str, str]]) -> dict[str, list[str]]:
+    """Topics by role; truth and results go by their names, everything else by message type."""
+    named = {topic for topics in _BY_TOPIC.values() for topic in topics}
+    others = [(topic, kind) for topic, kind in present if topic not in named]
+    roles = {role.name: topics_for(role, others) for role in ROLES.values()}
+    topics = {topic for topic, _ in present}
+    return roles | {name: [topic for topic in known if topic in topics] for name, known in _BY_TOPIC.items()}
