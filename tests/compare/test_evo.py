@@ -33,8 +33,8 @@ def ours(estimate: Trajectory, reference: Trajectory, *, aligned: bool) -> Figur
 def evos(estimate: Trajectory, reference: Trajectory, *, aligned: bool) -> Figures:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        from evo.core import metrics, sync
-        from evo.core.trajectory import PoseTrajectory3D
+        from evo.core import metrics, sync  # noqa: PLC0415 - evo warns when it is imported
+        from evo.core.trajectory import PoseTrajectory3D  # noqa: PLC0415
 
     def to_evo(trajectory: Trajectory) -> PoseTrajectory3D:
         quaternion = quaternion_from_yaw(trajectory.poses[:, 2])

@@ -54,14 +54,14 @@ def position_figures(errors: Array) -> Figures:
 def axis_figures(errors: Array, reference: Array) -> Figures:
     """Of one axis, errors (N,) and true coordinates (N,): the thesis's relative figures (section 5.1).
 
-    They depend on where the origin lies. Rows whose true coordinate is zero have none and do not count.
+    They depend on where the origin lies. Where the truth is zero, within a micrometre, there are none.
     """
     figures: Figures = dict.fromkeys(
         ("median_abs_m", "mean_relative_percent", "max_relative_percent", "under_5_percent")
     )
     if len(errors):
         figures["median_abs_m"] = float(np.median(np.abs(errors)))
-    away = reference != 0
+    away = np.abs(reference) >= 1e-6
     if away.any():
         percent = 100 * np.abs(errors[away] / reference[away])
         figures["mean_relative_percent"] = float(percent.mean())

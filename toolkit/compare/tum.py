@@ -43,7 +43,6 @@ def render(trajectory: Trajectory) -> str:
     for time_ns, pose, quaternion in zip(
         trajectory.time_ns.tolist(), trajectory.poses.tolist(), quaternions.tolist(), strict=True
     ):
-        seconds, rest = divmod(time_ns, 10**9)
         numbers = " ".join(repr(number + 0.0) for number in (pose[0], pose[1], 0.0, *quaternion))
-        lines.append(f"{seconds}.{rest:09d} {numbers}\n")
+        lines.append(f"{Decimal(time_ns).scaleb(-9):.9f} {numbers}\n")
     return "".join(lines)
