@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from toolkit import __version__
+from toolkit.errors import ToolkitError
 
 RUN = "mcap-landmarks.run"
 """Name of the metadata record that holds the manifest."""
@@ -53,6 +54,13 @@ def carried_fingerprint(metadata: Mapping[str, Mapping[str, str]]) -> str | None
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file's content."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+    """SHA-256 of a file's content.
+
+    Raises:
+        ToolkitError: the file cannot be read.
+    """
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise ToolkitError(f"{path}: cannot be read ({error.strerror}); check the path") from error

@@ -108,6 +108,15 @@ def _export(outcome: "Outcome", truth: "Reference", pairing: "Pairing", tum: Pat
 
 
 def _print(document: dict[str, Any]) -> None:
+    if document["bundles"] or document["localized"]:
+        _print_counts(document)
+    if document["scored"]:
+        _print_poses(document)
+    if document["map"]:
+        _print_map(document["map"])
+
+
+def _print_counts(document: dict[str, Any]) -> None:
     eligible = document["eligible"]
     rows = [[name, str(document[name] if document[name] is not None else "-"), ""] for name in _COUNTS]
     rows[2][2] = _percent(document["localized"] / eligible if eligible else None) + " of eligible"
@@ -115,10 +124,7 @@ def _print(document: dict[str, Any]) -> None:
     rows.append(["false: over 1 m or 20 degrees", str(false["count"]), _percent(false["share"]) + " of scored"])
     rows.extend([f"status {name}", str(count), ""] for name, count in (document["statuses"] or {}).items())
     table(["bundles", "count", "share"], rows)
-    if document["scored"]:
-        _print_poses(document)
-    if document["map"]:
-        _print_map(document["map"])
+    say()
 
 
 _COUNTS = ("bundles", "eligible", "localized", "scored")
@@ -126,7 +132,6 @@ _COUNTS = ("bundles", "eligible", "localized", "scored")
 
 def _print_poses(document: dict[str, Any]) -> None:
     position, heading, fit = document["position"], document["heading"], document["alignment"]
-    say()
     table(
         ["position", "RMSE", "median", "95 %", "max", "in 0.2 m", "in 1 m"],
         [
@@ -160,10 +165,10 @@ def _print_poses(document: dict[str, Any]) -> None:
         moved = f"{fit['x_m']:.3f} m, {fit['y_m']:.3f} m, {fit['heading_deg']:.3f} deg"
         rows.append(["truth from estimate", moved])
     table(["figure", "value"], rows)
+    say()
 
 
 def _print_map(figures: dict[str, Any]) -> None:
-    say()
     counts = ["landmarks", "reference", "matched", "missing", "spurious"]
     errors = [_metres(figures["rmse_aligned_m"]), _metres(figures["rmse_m"])]
     table(

@@ -27,9 +27,13 @@ def open_recording(path: Path, *, verify: bool = True) -> Iterator["Recording"]:
     Raises:
         RecordingError: there is no such file, or it is not an MCAP file.
     """
+    with _open(path) as stream:
+        yield Recording(path, stream, _index(path, stream), verify=verify)
+
+
+def _open(path: Path) -> BinaryIO:
     try:
-        with path.open("rb") as stream:
-            yield Recording(path, stream, _index(path, stream), verify=verify)
+        return path.open("rb")
     except FileNotFoundError as error:
         raise RecordingError(f"{path}: there is no such file") from error
     except IsADirectoryError as error:
