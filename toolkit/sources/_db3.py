@@ -41,10 +41,14 @@ def unpacked(data: bytes | memoryview) -> bytes | memoryview:
     """
     if data[:4] != ZSTD_MAGIC:
         return data
+    stream = zstandard.ZstdDecompressor().decompressobj()
     try:
-        return zstandard.ZstdDecompressor().decompressobj().decompress(data)
+        content = stream.decompress(data)
     except zstandard.ZstdError as error:
         raise MessageError(f"{len(data)} bytes cannot be decompressed ({error})") from error
+    if not stream.eof:
+        raise MessageError(f"{len(data)} bytes cannot be decompressed (they are cut)")
+    return content
 
 
 class Db3Log:
@@ -253,7 +257,9 @@ def _fetched(database: sqlite3.Connection, keys: Iterator[_Key]) -> Iterator[_Ro
 def _by_row(database: sqlite3.Connection) -> Iterator[tuple[int, int, int]]:
     """Time, row id and topic of the rows before the damage, in the order written."""
     with contextlib.suppress(sqlite3.DatabaseError):
-        yield from map(tuple, database.execute("SELECT timestamp, rowid, topic_id FROM messages"))
+        for time_ns, row, topic in database.execute("SELECT timestamp, rowid, topic_id FROM messages"):
+            if isinstance(time_ns, int) and isinstance(topic, int):
+                yield time_ns, row, topic
 
 
 def _salvaged(database: sqlite3.Connection, after: _Key, end_ns: int) -> Iterator[_Row]:

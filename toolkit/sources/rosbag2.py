@@ -87,23 +87,47 @@ def _part(plain: Path, file: Path, distribution: str | None) -> Log | McapFile:
 
 @contextlib.contextmanager
 def _plain(file: Path) -> Iterator[Path]:
-    """The file itself, or a temporary one without the compression around it."""
+    """The file itself, or a temporary one without the compression around it or the half page at its end."""
     with file.open("rb") as stream:
-        compressed = stream.read(4) == ZSTD_MAGIC
-    if not compressed:
+        start = stream.read(18)
+    size = file.stat().st_size
+    if start.startswith(ZSTD_MAGIC):
+        with _temporary(file, size, compressed=True) as plain, _plain(plain) as whole:
+            yield whole
+    elif start.startswith(_MAGICS[0]) and (half := size % _page_bytes(start)):
+        # SQLite would fill a half page with zeros and give them out as data.
+        with _temporary(file, size - half, compressed=False) as plain:
+            yield plain
+    else:
         yield file
-        return
+
+
+def _page_bytes(header: bytes) -> int:
+    """Page size from an SQLite file's header, where 1 stands for 64 KiB; 1 if that makes no sense."""
+    size = int.from_bytes(header[16:18], "big")
+    return 65536 if size == 1 else size if size.bit_count() == 1 else 1
+
+
+@contextlib.contextmanager
+def _temporary(file: Path, size: int, *, compressed: bool) -> Iterator[Path]:
+    """A temporary copy of the first bytes of a file, decompressed if asked for."""
     with tempfile.TemporaryDirectory() as folder:
-        plain = Path(folder) / file.name.removesuffix(".zstd")
+        copy = Path(folder) / file.name.removesuffix(".zstd")
         try:
-            with file.open("rb") as source, plain.open("wb") as target:
-                shutil.copyfileobj(zstandard.ZstdDecompressor().stream_reader(source), target)
+            with file.open("rb") as source, copy.open("wb") as target:
+                if compressed:
+                    shutil.copyfileobj(zstandard.ZstdDecompressor().stream_reader(source), target)
+                else:
+                    shutil.copyfileobj(source, target)
+                    target.truncate(size)
         except zstandard.ZstdError as error:
             raise RecordingError(f"{file} cannot be decompressed ({error}); copy it again") from error
         except OSError as error:
             where = tempfile.gettempdir()
-            raise RecordingError(f"{file} cannot be decompressed into {where}: {error.strerror}; free space") from error
-        yield plain
+            raise RecordingError(
+                f"{file} cannot be unpacked into {where} ({error.strerror}); free space there"
+            ) from error
+        yield copy
 
 
 def _storage_files(folder: Path) -> list[Path]:
