@@ -1,0 +1,37 @@
+"""Build a map of one bundled log, localize another in it, and measure the error."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from toolkit.cli.console import say
+
+
+def command(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder for the results; created if its parent exists.")
+    ] = Path("mcap-landmarks-demo"),
+) -> None:
+    """Build a map of one bundled log, localize another in it, measure the error and draw it.
+
+    Every step is a verb that works the same on your own logs; the command line of each is printed before it runs.
+    """
+    from toolkit.cli import evaluate, localize, plot
+    from toolkit.cli import map as build
+    from toolkit.resources import resource
+    from toolkit.runs.outputs import make_folder
+
+    make_folder(output)
+    seen, asked = resource("recordings", "demo_map.mcap"), resource("recordings", "demo_localize.mcap")
+    database, mapped, localized = output / "map.db", output / "mapped.mcap", output / "localized.mcap"
+    picture = output / "localized.png"
+
+    say(f"$ mcap-landmarks map {seen} --map {database} -o {mapped}")
+    build.command([seen], database, mapped)
+    say(f"\n$ mcap-landmarks localize {asked} --map {database} -o {localized}")
+    localize.command([asked], database, localized)
+    say(f"\n$ mcap-landmarks evaluate {localized} --align")
+    evaluate.command(localized, align=True)
+    say(f"\n$ mcap-landmarks plot {localized} --align -o {picture}")
+    plot.command([localized], picture, align=True)
