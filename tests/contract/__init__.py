@@ -1,0 +1,1 @@
+"""Contracts that every stage and every source keeps."""

@@ -1,0 +1,319 @@
+"""Conversion: every message arrives, in time order, once; what cannot is told, and nothing is half written."""
+
+import json
+import resource
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+from mcap.records import Attachment
+from mcap.writer import Writer as McapWriter
+from pymcap_cli.doctor import Severity, examine_mcap
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag1 import Reader as Reader1
+from rosbags.rosbag2 import Reader as Reader2
+
+from tests.sources.bags import (
+    HUMBLE,
+    ROS1,
+    START_NS,
+    scan,
+    times,
+    write_mrclam,
+    write_plain_db3,
+    write_ros1,
+    write_ros2,
+)
+from toolkit.errors import RecordingError, UsageError
+from toolkit.recording.reader import open_recording
+from toolkit.runs.convert import Conversion, Converted, Selection, convert
+from toolkit.sources import Progress
+
+BAGS = (
+    "legtracker_demo.bag",
+    "legtracker_positive_2_extracted.bag",
+    "rosbagjs_example.bag",
+    "rosbagjs_example_bz2.bag",
+    "rosbagjs_example_lz4.bag",
+    "rosbags_rs_sqlite3",
+    "rosbags_rs_mcap",
+    "rosbag2_split_sqlite3",
+    "rosbag2_split_mcap",
+    "topics_and_services.mcap",
+)
+
+
+@contextmanager
+def quiet(_label: str, _total: int | None) -> Iterator[Progress]:
+    yield lambda _advance: None
+
+
+def run(paths: Path | list[Path], output: Path, selection: Selection | None = None) -> Conversion:
+    several = paths if isinstance(paths, list) else [paths]
+    return convert(several, output, selection or Selection(), {"rosbag2": {"distro": "humble"}}, quiet)
+
+
+def one(paths: Path | list[Path], output: Path, selection: Selection | None = None) -> Converted:
+    (done,) = run(paths, output, selection).outputs
+    return done
+
+
+def doctor(path: Path) -> list[str]:
+    """Errors that pymcap-cli's doctor finds."""
+    with path.open("rb") as stream:
+        report = examine_mcap(stream, path.stat().st_size, str(path))
+    return [str(finding) for finding in report.findings if finding.severity is Severity.ERROR]
+
+
+def stored(path: Path) -> Counter[tuple[str, int, bytes]]:
+    """Topic, time and payload of every message of a ROS 2 bag, as rosbags reads them."""
+    with Reader2(path) as reader:
+        return Counter((connection.topic, time, bytes(data)) for connection, time, data in reader.messages())
+
+
+@pytest.mark.parametrize("name", [name for name in BAGS if not name.endswith(".bag")])
+def test_ros2_bags_arrive_whole(name: str, tmp_path: Path, shared_data: Path) -> None:
+    source, target = shared_data / "bags" / name, tmp_path / "out.mcap"
+    done = one(source, target)
+    wanted = stored(source)
+    assert stored(target) == wanted
+    assert done.topics.total() == done.declared == wanted.total()
+    assert (done.lost, done.losses) == (0, [])
+    assert doctor(target) == []
+
+
+@pytest.mark.parametrize("name", [name for name in BAGS if name.endswith(".bag")])
+def test_ros1_bags_arrive_whole(name: str, tmp_path: Path, shared_data: Path) -> None:
+    """Counts, and field by field the values of every message, against rosbags' reading of the bag."""
+    source, target = shared_data / "bags" / name, tmp_path / "out.mcap"
+    done = one(source, target)
+    with AnyReader([source]) as old, AnyReader([target]) as new:
+        wanted = {(c.topic, time, i): (c, data) for c, time, data, i in numbered(old)}
+        assert done.topics.total() == done.declared == len(wanted) == new.message_count
+        assert done.topics == {topic: info.msgcount for topic, info in old.topics.items()}
+        for c, time, data, i in numbered(new):
+            before, raw = wanted.pop((c.topic, time, i))
+            was, now = old.deserialize(raw, before.msgtype), new.deserialize(data, c.msgtype)
+            assert fields(was).items() <= fields(now).items()
+    assert not wanted
+    assert (done.lost, done.losses) == (0, [])
+    assert doctor(target) == []
+
+
+def numbered(reader: AnyReader) -> list[tuple]:
+    """Messages with their number among those of equal topic and time."""
+    seen: Counter[tuple[str, int]] = Counter()
+    rows = []
+    for connection, time, data in reader.messages():
+        rows.append((connection, time, data, seen[connection.topic, time]))
+        seen[connection.topic, time] += 1
+    return rows
+
+
+def fields(message: object, prefix: str = "") -> dict[str, object]:
+    """Every number and text of a message by its path, but `seq`."""
+    flat: dict[str, object] = {}
+    for name, value in vars(message).items():
+        key = f"{prefix}{name.lower()}"
+        if hasattr(value, "__msgtype__"):
+            flat |= fields(value, f"{key}.")
+        elif isinstance(value, list) and value and hasattr(value[0], "__msgtype__"):
+            for i, item in enumerate(value):
+                flat |= fields(item, f"{key}.{i}.")
+        elif name not in {"seq", "__msgtype__"}:
+            flat[key] = value.tobytes() if hasattr(value, "tobytes") else value
+    return {key: value for key, value in flat.items() if value == value}  # noqa: PLR0124 - leaves NaN out
+
+
+def test_publish_time_sequence_and_metadata_are_kept(tmp_path: Path) -> None:
+    source, target = tmp_path / "in.mcap", tmp_path / "out.mcap"
+    text = HUMBLE.generate_msgdef("std_msgs/msg/String", ros_version=2)[0].encode()
+    with source.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start("ros2")
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", text)
+        channel = writer.register_channel("/talk", "cdr", schema, {"offered_qos_profiles": "", "mine": "kept"})
+        for i in range(5):
+            writer.add_message(channel, 1000 + i, b"\0\1\0\0\1\0\0\0\0", publish_time=900 + i, sequence=77 + i)
+        writer.add_metadata("rosbag2", {"serialized_metadata": "version: 9"})
+        writer.add_metadata("site", {"hall": "4"})
+        writer.add_attachment(1, 1, "plan.txt", "text/plain", b"walls")
+        writer.finish()
+    one(source, target)
+    with target.open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True)
+        rows = [(message.log_time, message.publish_time, message.sequence) for _, _, message in reader.iter_messages()]
+        assert rows == [(1000 + i, 900 + i, 77 + i) for i in range(5)]
+        summary = reader.get_summary()
+        assert summary is not None
+        assert next(iter(summary.channels.values())).metadata == {"offered_qos_profiles": "", "mine": "kept"}
+        metadata = {record.name: record.metadata for record in reader.iter_metadata()}
+        assert set(metadata) == {"site", "mcap-landmarks.run"}
+        assert json.loads(metadata["mcap-landmarks.run"]["verb"]) == "convert"
+        attachments: list[Attachment] = list(reader.iter_attachments())
+        assert [(attachment.name, attachment.data) for attachment in attachments] == [("plan.txt", b"walls")]
+
+
+def test_ros1_messages_in_mcap_become_ros2(tmp_path: Path) -> None:
+    source, target = tmp_path / "in.mcap", tmp_path / "out.mcap"
+    name = "sensor_msgs/msg/LaserScan"
+    with source.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start("ros1")
+        text = ROS1.generate_msgdef(name, ros_version=1)[0].encode()
+        schema = writer.register_schema("sensor_msgs/LaserScan", "ros1msg", text)
+        channel = writer.register_channel("/scan", "ros1", schema, {"latching": "1"})
+        other = writer.register_channel("/json", "json", 0)
+        writer.add_message(channel, START_NS, bytes(ROS1.serialize_ros1(scan(ROS1, START_NS), name)), START_NS)
+        writer.add_message(other, START_NS, b"{}", START_NS)
+        writer.finish()
+    done = one(source, target)
+    assert done.topics == {"/scan": 1}
+    assert done.dropped == {"/json: json messages, where ROS 2 needs CDR": 1}
+    wanted = bytes(HUMBLE.serialize_cdr(scan(HUMBLE, START_NS), name))
+    assert stored(target) == {("/scan", START_NS, wanted): 1}
+
+
+def test_parts_of_a_split_bag_become_one(tmp_path: Path, shared_data: Path) -> None:
+    folder = shared_data / "bags" / "rosbag2_split_sqlite3"
+    parts = sorted(folder.glob("*.db3"))
+    done = one(parts[::-1], tmp_path / "out.mcap")
+    assert done.topics.total() == 6074
+    with open_recording(tmp_path / "out.mcap") as recording:
+        assert len(recording.channels) == 8
+    one(folder, tmp_path / "folder.mcap")
+    assert stored(tmp_path / "out.mcap") == stored(tmp_path / "folder.mcap")
+
+
+def test_several_logs_merge_into_one_file(tmp_path: Path) -> None:
+    """A ROS 1 bag, a ROS 2 bag and a plain database of the same topic: one channel per type and quality."""
+    sources = [write_ros1(tmp_path / "a.bag"), write_ros2(tmp_path / "b"), write_plain_db3(tmp_path / "c.db3")]
+    done = one(sources, tmp_path / "out.mcap")
+    assert done.topics == {"/scan": 40 + 20, "/talk": 40 + 20 + 20}
+    with open_recording(tmp_path / "out.mcap") as recording:
+        assert sorted(entry.connection.topic for entry in recording.channels) == ["/scan"] * 2 + ["/talk"] * 3
+        stamps = [raw.log_time_ns for raw in recording.messages()]
+    assert stamps == sorted(stamps)
+    twice = one([sources[0], write_ros1(tmp_path / "d.bag")], tmp_path / "twice.mcap")
+    assert twice.topics == {"/scan": 80, "/talk": 80}
+    with open_recording(tmp_path / "twice.mcap") as recording:
+        assert [entry.count for entry in recording.channels] == [80, 80]
+
+
+def test_several_logs_go_into_a_folder(tmp_path: Path) -> None:
+    sources = [write_ros1(tmp_path / "a.bag"), write_ros2(tmp_path / "b")]
+    done = run(sources, tmp_path / "out").outputs
+    assert [(entry.path.name, entry.topics.total()) for entry in done] == [("a.mcap", 80), ("b.mcap", 40)]
+    (tmp_path / "other").mkdir()
+    clash = [sources[0], write_ros1(tmp_path / "other" / "a.bag")]
+    with pytest.raises(UsageError, match=r"another input also writes .*a\.mcap"):
+        run(clash, tmp_path / "clash")
+    assert not (tmp_path / "clash").exists()
+
+
+def test_robots_go_into_a_folder(tmp_path: Path) -> None:
+    source = write_mrclam(tmp_path / "set")
+    done = run(source, tmp_path / "out").outputs
+    assert [entry.path.name for entry in done] == ["robot1.mcap", "robot2.mcap"]
+    assert done[0].dropped == {"Robot1_Measurement.dat: barcode of a robot": 5}
+    assert doctor(done[0].path) == []
+    with pytest.raises(UsageError, match="holds 2 logs; give -o a folder"):
+        run(source, tmp_path / "out.mcap")
+    with pytest.raises(UsageError, match="missing does not exist; create it first"):
+        run(source, tmp_path / "missing" / "out")
+
+
+def test_topics_and_times_choose(tmp_path: Path) -> None:
+    source = write_ros1(tmp_path / "a.bag")
+    done = one(source, tmp_path / "out.mcap", Selection(("/t.lk", "/nothing"), times(40)[3], times(40)[9]))
+    assert done.topics == {"/talk": 6}
+    assert (done.declared, done.lost) == (6, 0)
+    assert done.dropped == {"messages outside the time range": 34}
+    with pytest.raises(UsageError, match=r"--topics matches none of /scan, /talk"):
+        run(source, tmp_path / "none.mcap", Selection(("/tal",)))
+    with pytest.raises(UsageError, match="not a regular expression"):
+        run(source, tmp_path / "none.mcap", Selection(("(",)))
+    with pytest.raises(RecordingError, match="no message lies in the time range"):
+        run(source, tmp_path / "none.mcap", Selection(start_ns=5, end_ns=6))
+    assert not (tmp_path / "none.mcap").exists()
+
+
+def test_equal_inputs_give_equal_bytes(tmp_path: Path) -> None:
+    source = write_ros1(tmp_path / "a.bag")
+    (tmp_path / "elsewhere").mkdir()
+    copy = (tmp_path / "elsewhere" / "b.bag").write_bytes(source.read_bytes())
+    assert copy
+    one(source, tmp_path / "a.mcap")
+    one(tmp_path / "elsewhere" / "b.bag", tmp_path / "elsewhere" / "b.mcap")
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "elsewhere" / "b.mcap").read_bytes()
+
+
+def test_a_cut_bag_gives_an_output_and_its_losses(tmp_path: Path) -> None:
+    source = write_ros1(tmp_path / "a.bag")
+    source.write_bytes(source.read_bytes()[: source.stat().st_size * 3 // 4])
+    done = one(source, tmp_path / "out.mcap")
+    assert 0 < done.topics.total() < 80
+    assert done.losses
+    assert stored(tmp_path / "out.mcap").total() == done.topics.total()
+
+
+def test_a_damaged_chunk_is_counted(tmp_path: Path) -> None:
+    source = write_ros1(tmp_path / "a.bag", compression="bz2")
+    with Reader1(source) as reader:
+        chunk = reader.chunks[min(reader.chunks)]
+    data = bytearray(source.read_bytes())
+    data[chunk.datapos + 20] ^= 1
+    source.write_bytes(data)
+    done = one(source, tmp_path / "out.mcap")
+    assert done.declared == 80
+    assert done.lost == 80 - done.topics.total() > 0
+    assert done.losses[0].startswith("a.bag: the chunk at byte")
+
+
+def test_where_nothing_can_be_read_nothing_is_written(tmp_path: Path) -> None:
+    source = write_ros1(tmp_path / "a.bag")
+    source.write_bytes(source.read_bytes()[:4300])
+    with pytest.raises(RecordingError, match="no message can be read"):
+        run(source, tmp_path / "out.mcap")
+    empty = write_plain_db3(tmp_path / "empty.db3", count=0)
+    with pytest.raises(RecordingError, match="there are no messages in it"):
+        run(empty, tmp_path / "out.mcap")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.bag", "empty.db3"]
+
+
+def test_a_log_that_fails_among_several_does_not_stop_the_others(tmp_path: Path) -> None:
+    good, bad = write_ros1(tmp_path / "good.bag"), write_plain_db3(tmp_path / "bad.db3", message_type="my_msgs/msg/Own")
+    conversion = run([bad, good], tmp_path / "out")
+    assert [entry.path.name for entry in conversion.outputs] == ["good.mcap"]
+    assert "my_msgs/msg/Own" in str(conversion.failures[0])
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["good.mcap"]
+
+
+def test_the_input_is_never_the_output(tmp_path: Path) -> None:
+    source = tmp_path / "a.mcap"
+    one(write_ros1(tmp_path / "a.bag"), source)
+    before = source.read_bytes()
+    with pytest.raises(UsageError, match="is the input itself"):
+        run(source, source)
+    assert source.read_bytes() == before
+
+
+def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
+    source = write_ros1(tmp_path / "a.bag", count=2000)
+    program = "from toolkit.cli.main import run; run()"
+    done = subprocess.run(
+        [sys.executable, "-c", program, "convert", source, "-o", tmp_path / "out.mcap"],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
+    )
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "free space" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["a.bag"]
