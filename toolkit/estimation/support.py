@@ -1,0 +1,27 @@
+"""Which landmarks of a map are there for sure, and which may be misreadings of others."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Squared distance (2 degrees of freedom) within which two landmarks may be one.
+_SAME_PLACE = 9.21
+
+
+def confirmed(
+    landmarks_xy: Array, covariance: Array, sightings: NDArray[np.int64], least: int = 3, share: float = 0.1
+) -> NDArray[np.bool_]:
+    """Which of L landmarks (L, 2) with covariance (L, 2, 2) are supported well enough by fitting sightings (L,).
+
+    Fewer than `least` are too few. One with less than `share` of the sightings of another that stands where it stands,
+    as far as both covariances tell, is taken for a misreading of that one's class.
+    """
+    sure = sightings >= least
+    for weak in np.flatnonzero(sure & (sightings < share * sightings.max(initial=0))):
+        rivals = np.flatnonzero(share * sightings > sightings[weak])
+        gap = landmarks_xy[rivals] - landmarks_xy[weak]
+        both = covariance[rivals] + covariance[weak]
+        squared = np.einsum("ri,ri->r", gap, np.linalg.solve(both, gap[..., None])[..., 0])
+        sure[weak] = bool((squared > _SAME_PLACE).all())
+    return sure
