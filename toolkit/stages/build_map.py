@@ -24,8 +24,8 @@ class BuildMapConfig:
     a first guess, per square root of a metre or radian; the log itself tells the rest. `slack` widens the observations'
     sigmas while they are labelled. `robust_dof`: degrees of the Student-t distribution of the joint solution.
     A landmark with fewer good sightings than `min_sightings` is tentative, and so is one that stands where another does
-    and was seen less than `misread_share` times as often: that one under a wrong class. Logs join if their landmarks agree within
-    `join_tolerance_m`.
+    and was seen less than `misread_share` times as often: it is that one under a wrong class. Logs join if their
+    landmarks agree within `join_tolerance_m`.
     """
 
     method: Literal["default", "thesis"] = "default"
