@@ -3,7 +3,6 @@
 import bz2
 import struct
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import BinaryIO, NamedTuple
 
@@ -18,6 +17,8 @@ _UINT32 = struct.Struct("<I")
 _TIME = struct.Struct("<II")
 _COUNT = struct.Struct("<II")
 _INDEX_ENTRY = struct.Struct("<III")
+_OP_FIELD, _CONN_FIELD, _TIME_FIELD = b"\x04\0\0\0op=\x02", b"\x09\0\0\0conn=", b"\x0d\0\0\0time="
+_MESSAGE_HEADER = 8 + 13 + 17
 Header = dict[bytes, bytes]
 
 
@@ -183,31 +184,51 @@ def decompress(header: Header, data: bytes) -> tuple[memoryview, bool]:
     return memoryview(content), len(content) == size
 
 
-def chunk_records(content: memoryview) -> Iterator[tuple[Header, memoryview]]:
-    """Header and data of each record of a chunk, in the order written.
+def parse_chunk(content: memoryview) -> tuple[list[BagMessage], dict[int, BagConnection], str | None]:
+    """Messages and connections of a chunk's content in the order written, and what was wrong with it, if anything."""
+    messages: list[BagMessage] = []
+    connections: dict[int, BagConnection] = {}
+    position, end = 0, len(content)
+    op = conn = time = 0  # where the last message had its fields: most often the next has them there, too
+    try:
+        while position < end:
+            start, stop, data_start, position = _extent(content, position, end)
+            head, data = bytes(content[start:stop]), content[data_start:position]
+            if (
+                len(head) == _MESSAGE_HEADER
+                and head[op : op + 8] == _OP_FIELD
+                and head[conn : conn + 9] == _CONN_FIELD
+                and head[time : time + 9] == _TIME_FIELD
+            ):
+                seconds, nanoseconds = _TIME.unpack_from(head, time + 9)
+                messages.append(BagMessage(seconds * 10**9 + nanoseconds, _UINT32.unpack_from(head, conn + 9)[0], data))
+                continue
+            header = parse_header(memoryview(head))
+            if operation(header) == MESSAGE:
+                messages.append(BagMessage(time_ns(field(header, b"time")), uint32(field(header, b"conn")), data))
+                op, conn, time = (max(head.find(name), 0) for name in (_OP_FIELD, _CONN_FIELD, _TIME_FIELD))
+            elif operation(header) == CONNECTION:
+                key, connection = parse_connection(header, data)
+                connections[key] = connection
+    except DamagedBagError as error:
+        return messages, connections, str(error)
+    return messages, connections, None
+
+
+def _extent(content: memoryview, position: int, end: int) -> tuple[int, int, int, int]:
+    """Start and end of the header and of the data of the record at a position.
 
     Raises:
-        DamagedBagError: the last one is cut.
+        DamagedBagError: it is cut.
     """
-    position, end = 0, len(content)
-    unpack = _UINT32.unpack_from
-    while position < end:
-        if position + 4 > end:
-            raise DamagedBagError("a record in it is cut")
-        start = position + 4
-        stop = start + unpack(content, position)[0]
-        if stop + 4 > end:
-            raise DamagedBagError("a record in it is cut")
-        data_start = stop + 4
-        position = data_start + unpack(content, stop)[0]
-        if position > end:
-            raise DamagedBagError("a record in it is cut")
-        yield parse_header(content[start:stop]), content[data_start:position]
-
-
-def message_of(header: Header, data: memoryview) -> BagMessage:
-    """The message of a message record."""
-    return BagMessage(time_ns(field(header, b"time")), uint32(field(header, b"conn")), data)
+    start = position + 4
+    if start <= end:
+        stop = start + _UINT32.unpack_from(content, position)[0]
+        if stop + 4 <= end:
+            last = stop + 4 + _UINT32.unpack_from(content, stop)[0]
+            if last <= end:
+                return start, stop, stop + 4, last
+    raise DamagedBagError("a record in it is cut")
 
 
 def index_counts(header: Header, data: bytes) -> Counter[int]:

@@ -108,23 +108,13 @@ def read_chunk(
     stream: BinaryIO, size: int, offset: int
 ) -> tuple[list[BagMessage], dict[int, BagConnection], str | None]:
     """Messages of the chunk at an offset by time, its connections, and what was wrong with it, None for nothing."""
-    messages: list[BagMessage] = []
-    connections: dict[int, BagConnection] = {}
-    problem: str | None = None
     try:
         content, whole = _content(stream, size, offset)
-        problem = None if whole else "it is cut"
-        for head, data in container.chunk_records(content):
-            kind = container.operation(head)
-            if kind == container.MESSAGE:
-                messages.append(container.message_of(head, data))
-            elif kind == container.CONNECTION:
-                key, connection = container.parse_connection(head, data)
-                connections[key] = connection
     except DamagedBagError as error:
-        problem = str(error)
+        return [], {}, str(error)
+    messages, connections, problem = container.parse_chunk(content)
     messages.sort(key=lambda message: message.time_ns)
-    return messages, connections, problem
+    return messages, connections, problem or (None if whole else "it is cut")
 
 
 def _content(stream: BinaryIO, size: int, offset: int) -> tuple[memoryview, bool]:

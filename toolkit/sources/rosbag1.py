@@ -8,7 +8,7 @@ from pathlib import Path
 
 from toolkit.errors import MessageError, RecordingError
 from toolkit.messages.qos import KEY, qos_profile
-from toolkit.sources._bag_container import MAGIC, BagConnection, ChunkInfo, DamagedBagError
+from toolkit.sources._bag_container import MAGIC, BagConnection, BagMessage, ChunkInfo, DamagedBagError
 from toolkit.sources._bag_index import BagIndex, read_chunk, read_index
 from toolkit.sources._merge import merge
 from toolkit.sources._ros1_types import Convert, converted
@@ -62,7 +62,8 @@ class BagLog:
             self._connections[key] = shared[described]
         counts: Counter[Connection] = Counter()
         for key, count in index.counts().items():
-            counts[self._connections[key]] += count
+            if key in self._connections:  # the others are told of when they are read
+                counts[self._connections[key]] += count
         self.channels = [ChannelSummary(connection, counts[connection]) for connection in shared.values()]
         self.start_ns = min((chunk.start_ns for chunk in self._chunks), default=None)
         self.end_ns = max((chunk.end_ns for chunk in self._chunks), default=None)
@@ -81,38 +82,47 @@ class BagLog:
             RecordingError: the definition of a wanted type cannot be understood.
         """
         wanted = {key: c for key, c in self._connections.items() if connections is None or c in connections}
-        convert = {connection: self._conversion(connection) for connection in wanted.values()}
+        carried = {key: (connection, self._conversion(connection)) for key, connection in wanted.items()}
         first, last = start_ns or 0, 2**64 if end_ns is None else end_ns
         chunks = [chunk for chunk in self._chunks if chunk.end_ns >= first and chunk.start_ns < last]
-        for raw in merge((chunk.start_ns, partial(self._load, chunk, wanted, progress)) for chunk in chunks):
-            if not first <= raw.log_time_ns < last:
-                continue
-            try:
-                data = convert[raw.connection](raw.data)
-            except MessageError as error:
-                self._misfit(raw.connection, error)
-                continue
-            yield RawMessage(raw.connection, raw.log_time_ns, raw.publish_time_ns, raw.sequence, data)
+        return merge(
+            (max(chunk.start_ns, first), partial(self._load, chunk, carried, (first, last), progress))
+            for chunk in chunks
+        )
 
-    def _load(self, chunk: ChunkInfo, wanted: dict[int, Connection], progress: Progress | None) -> list[RawMessage]:
+    def _load(
+        self,
+        chunk: ChunkInfo,
+        carried: dict[int, tuple[Connection, Convert]],
+        within_ns: tuple[int, int],
+        progress: Progress | None,
+    ) -> list[RawMessage]:
+        """Messages of a chunk, converted."""
+        messages = []
+        first, last = within_ns
+        for time_ns, key, data in self._checked(chunk, progress):
+            if key in carried and first <= time_ns < last:
+                connection, convert = carried[key]
+                try:
+                    messages.append(RawMessage(connection, time_ns, time_ns, 0, convert(data)))
+                except MessageError as error:
+                    self._misfit(connection, error)
+        return messages
+
+    def _checked(self, chunk: ChunkInfo, progress: Progress | None) -> list[BagMessage]:
+        """Messages of a chunk; what it lacks is told."""
         with self._path.open("rb") as stream:
             found, _, problem = read_chunk(stream, self._size, chunk.offset)
             if progress:
                 progress(stream.tell() - chunk.offset)
-        missing = sum(chunk.counts.values()) - len(found)
-        if missing or problem:
+        declared = sum(chunk.counts.values())
+        if problem or len(found) < declared:
             why = f" ({problem})" if problem else ""
-            self._lose(
-                f"the chunk at byte {chunk.offset}{why} lacks {missing} of {sum(chunk.counts.values())} messages"
-            )
+            self._lose(f"the chunk at byte {chunk.offset}{why} lacks {declared - len(found)} of {declared} messages")
         orphans = sum(message.connection_id not in self._connections for message in found)
         if orphans:
             self._lose(f"{orphans} messages of the chunk at byte {chunk.offset} belong to no connection")
-        return [
-            RawMessage(connection, message.time_ns, message.time_ns, 0, message.data)
-            for message in found
-            if (connection := wanted.get(message.connection_id)) is not None
-        ]
+        return found
 
     def _conversion(self, connection: Connection) -> Convert:
         convert = self._convert[connection]
