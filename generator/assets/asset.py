@@ -53,18 +53,27 @@ class Asset:
 
 
 @dataclass(frozen=True, slots=True)
-class AssetClass:
-    """How to make one class: a module of this package's `classes` or `distractors` declares exactly one as `CLASS`.
+class Variant:
+    """How to make one kind of a class: its fixed section, its closed solids, and the pictures of their materials.
 
-    `shape(variant, rng)` gives closed solids whose materials are the keys of what `paint(variant, rng)` gives; the two
-    get separate random generators. `sections` has the fixed section of each variant, the default variant first.
+    `shape` and `paint` get separate random generators.
+    """
+
+    section: Section
+    shape: Callable[[np.random.Generator], Sequence[Solid]]
+    paint: Callable[[np.random.Generator], Mapping[str, Image]]
+
+
+@dataclass(frozen=True, slots=True)
+class AssetClass:
+    """One class of objects, its variants by name, the default first.
+
+    A module of this package's `classes` or `distractors` declares exactly one, as `CLASS`.
     """
 
     name: str
     coco_id: int | None
-    sections: Mapping[str, Section]
-    shape: Callable[[str, np.random.Generator], Sequence[Solid]]
-    paint: Callable[[str, np.random.Generator], Mapping[str, Image]]
+    variants: Mapping[str, Variant]
 
 
 def assemble(solids: Sequence[Solid], pictures: Mapping[str, Image]) -> tuple[Part, ...]:

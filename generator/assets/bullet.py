@@ -48,7 +48,9 @@ class AssetStore:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._folder.cleanup()
 
     def spawn(self, asset: Asset, position: ArrayLike = (0.0, 0.0, 0.0), yaw_rad: float = 0.0) -> tuple[Body, ...]:

@@ -21,7 +21,9 @@ def _mottled(rng: np.random.Generator, colour: Colour, coarse: float, grain: flo
     return colour * (1 + coarse * patches + grain * rng.standard_normal((SIZE_PX, SIZE_PX)))[..., None]
 
 
-def _joints(rng: np.random.Generator, image: NDArray[np.float64], rows: int, columns: int, shift: float) -> NDArray[np.float64]:
+def _joints(
+    rng: np.random.Generator, image: NDArray[np.float64], rows: int, columns: int, shift: float
+) -> NDArray[np.float64]:
     """Stones of uneven brightness with darker joints, every other row shifted by a share of a stone."""
     v, u = np.mgrid[0:SIZE_PX, 0:SIZE_PX] / SIZE_PX
     row = np.floor(v * rows).astype(int)
@@ -50,7 +52,9 @@ def _concrete(rng: np.random.Generator) -> NDArray[np.float64]:
 
 def _gravel(rng: np.random.Generator) -> NDArray[np.float64]:
     stones = noise(rng, SIZE_PX, SIZE_PX, octaves=3, cells=32) - 0.5
-    return _mottled(rng, hsv(0.09, rng.uniform(0, 0.3), rng.uniform(0.4, 0.7)), 0.2, 0.05) * (1 + 0.5 * stones[..., None])
+    return _mottled(rng, hsv(0.09, rng.uniform(0, 0.3), rng.uniform(0.4, 0.7)), 0.2, 0.05) * (
+        1 + 0.5 * stones[..., None]
+    )
 
 
 def _soil(rng: np.random.Generator) -> NDArray[np.float64]:
@@ -80,7 +84,9 @@ def _planks(rng: np.random.Generator) -> NDArray[np.float64]:
     colour = hsv(rng.uniform(0.06, 0.11), rng.uniform(0.3, 0.6), rng.uniform(0.4, 0.75))
     rows = np.arange(SIZE_PX)[:, None] / SIZE_PX
     grain = np.sin(2 * np.pi * (32 * rows + 1.5 * noise(rng, SIZE_PX, SIZE_PX)))
-    return _joints(rng, _mottled(rng, colour, 0.15, 0.02) * (1 + 0.06 * grain[..., None]), int(rng.integers(6, 13)), 1, 0.37)
+    return _joints(
+        rng, _mottled(rng, colour, 0.15, 0.02) * (1 + 0.06 * grain[..., None]), int(rng.integers(6, 13)), 1, 0.37
+    )
 
 
 _PAINTERS: dict[str, Callable[[np.random.Generator], NDArray[np.float64]]] = {

@@ -1,4 +1,4 @@
-"""Horizontal cross-sections of objects at LiDAR height: unions of discs and (rounded) boxes, declared per class and variant."""
+"""Horizontal cross-sections of objects at LiDAR height, declared per class and variant: unions of discs and boxes."""
 
 from dataclasses import dataclass
 
@@ -43,7 +43,7 @@ class Box:
         half = np.array([self.length_m / 2, self.width_m / 2]) - self.corner_m
         beyond = np.abs(points_xy - np.array([self.x_m, self.y_m])) - half
         outside = np.hypot(np.maximum(beyond[:, 0], 0.0), np.maximum(beyond[:, 1], 0.0))
-        return outside + np.minimum(beyond.max(axis=1), 0.0) - self.corner_m
+        return np.asarray(outside + np.minimum(beyond.max(axis=1), 0.0) - self.corner_m)
 
     @property
     def reach_m(self) -> float:
@@ -53,13 +53,13 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """The union of `shapes`; its centre is the object's origin, and so the point that maps and truth call its position."""
+    """The union of `shapes`; its centre is the object's origin, which maps and truth call the object's position."""
 
     shapes: tuple[Disc | Box, ...]
 
     def signed_distance_m(self, points_xy: NDArray[np.float64]) -> NDArray[np.float64]:
         """Distance (N,) of points (N,2) to the outline, negative inside (a bound, not exact, deep inside overlaps)."""
-        return np.min([shape.signed_distance_m(points_xy) for shape in self.shapes], axis=0)
+        return np.asarray(np.min([shape.signed_distance_m(points_xy) for shape in self.shapes], axis=0))
 
     @property
     def radius_m(self) -> float:

@@ -1,4 +1,4 @@
-"""Solids from few numbers: lofts through rings, and what follows from them (lathe, tube, box, ellipsoid, leaf, torus)."""
+"""Solids from few numbers: lofts through rings, and what follows from them (lathe, limb, boxes, ellipsoid, torus)."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +11,7 @@ def circle(radius_m: float = 1.0, sides: int = 16, start_rad: float = 0.0) -> Fl
     angle = start_rad + 2 * np.pi * np.arange(sides) / sides
     half = np.pi / sides
     mean = np.cos(half) * np.log(np.tan(half) + 1 / np.cos(half)) / half
-    return radius_m / mean * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.asarray(radius_m / mean * np.column_stack([np.cos(angle), np.sin(angle)]))
 
 
 def rounded_rectangle(length_m: float, width_m: float, corner_m: float, arc_points: int = 4) -> Floats:
@@ -26,7 +26,7 @@ def rounded_rectangle(length_m: float, width_m: float, corner_m: float, arc_poin
 
 
 def surface(points: Floats, material: str, uv: Floats | None = None) -> Solid:
-    """A grid of points (A,B,3) as triangles; seen from outside, the second index runs counter-clockwise about the first."""
+    """A grid of points (A,B,3); seen from outside, the second index runs counter-clockwise about the first."""
     a, b = points.shape[:2]
     if uv is None:
         v, u = np.meshgrid(np.linspace(0, 1, a), np.linspace(0, 1, b), indexing="ij")
@@ -71,7 +71,7 @@ def lathe(profile: ArrayLike, material: str, sides: int = 16) -> Solid:
 
 
 def limb(spine: ArrayLike, radii: ArrayLike, material: str, sides: int = 10, front: ArrayLike = (1, 0, 0)) -> Solid:
-    """A bent rod along `spine` (K,3) with `radii` (K,) or (K,2); `front` is where the first radius points at the start."""
+    """A bent rod along `spine` (K,3), `radii` () or (K,) or (K,2); the first radius starts out towards `front`."""
     centres = np.asarray(spine, float)
     size = np.asarray(radii, float)
     if size.ndim < 2:
@@ -106,20 +106,22 @@ def box(length_m: float, width_m: float, height_m: float, material: str) -> Soli
     return Solid(np.array(vertices, float), np.array(uv, float), np.array(faces), material)
 
 
-def rounded_box(length_m: float, width_m: float, height_m: float, corner_m: float, material: str, edge_m: float) -> Solid:
+def rounded_box(
+    length_m: float, width_m: float, height_m: float, corner_m: float, material: str, edge_m: float
+) -> Solid:
     """A box centred on the origin, its upright edges rounded by `corner_m`, its top and bottom edges by `edge_m`."""
     turn = np.linspace(0.0, np.pi / 2, 4)
     inset = edge_m * (1 - np.sin(turn))
     depth = edge_m * (1 - np.cos(turn))
-    outlines = [
-        rounded_rectangle(length_m - 2 * i, width_m - 2 * i, max(corner_m - i, 1e-3)) for i in inset
-    ]
+    outlines = [rounded_rectangle(length_m - 2 * i, width_m - 2 * i, max(corner_m - i, 1e-3)) for i in inset]
     below = [(d - height_m / 2, outline) for d, outline in zip(depth, outlines, strict=True)]
     above = [(height_m / 2 - d, outline) for d, outline in zip(depth, outlines, strict=True)]
     return stack(below + above[::-1], material)
 
 
-def ellipsoid(length_m: float, width_m: float, height_m: float, material: str, sides: int = 12, rings: int = 8) -> Solid:
+def ellipsoid(
+    length_m: float, width_m: float, height_m: float, material: str, sides: int = 12, rings: int = 8
+) -> Solid:
     """An ellipsoid about the origin with the given diameters, its poles on z."""
     polar = np.linspace(-np.pi / 2, np.pi / 2, rings)
     profile = np.column_stack([np.cos(polar), np.sin(polar)]) / 2

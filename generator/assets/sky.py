@@ -63,7 +63,7 @@ def _clouded(rng: np.random.Generator, zenith: Colour, horizon: Colour) -> NDArr
     density = np.clip((cover - rng.uniform(0.35, 0.9)) * 3.5, 0, 1)[..., None] * rng.uniform(0.4, 0.95)
     bright = grey(rng, 0.85, 1.0) * (1 - 0.2 * np.clip(cover - 0.6, 0, 1))[..., None]
     fade = np.clip(elevation / np.deg2rad(10.0), 0, 1)[:, None, None]
-    return image + (bright - image) * density * fade
+    return np.asarray(image + (bright - image) * density * fade)
 
 
 def _ridge(
@@ -86,7 +86,9 @@ def _town(rng: np.random.Generator, image: NDArray[np.float64], horizon: Colour,
     while column < WIDTH_PX:
         width = int(rng.integers(40, 180))
         top = HORIZON_PX - int(rng.uniform(12, 110))
-        wall = pick(rng, (grey(rng, 0.3, 0.8), hsv(rng.uniform(0, 0.12), rng.uniform(0.15, 0.5), rng.uniform(0.35, 0.8))))
+        wall = pick(
+            rng, (grey(rng, 0.3, 0.8), hsv(rng.uniform(0, 0.12), rng.uniform(0.15, 0.5), rng.uniform(0.35, 0.8)))
+        )
         house = np.broadcast_to(wall, (HEIGHT_PX - top, width, 3)).copy()
         storey, bay = int(rng.integers(9, 18)), int(rng.integers(9, 20))
         window = pick(rng, (wall * 0.45, hsv(0.57, 0.3, 0.5), grey(rng, 0.1, 0.3)))
@@ -94,4 +96,4 @@ def _town(rng: np.random.Generator, image: NDArray[np.float64], horizon: Colour,
         house[(row % storey > storey * 0.45) & (offset % bay > bay * 0.45) & (row > 3)] = window
         target = image[top:, column : column + width]
         target[:] = (house + (horizon - house) * haze)[:, : target.shape[1]]
-        column += width + int(rng.choice([0, 0, rng.integers(0, 120)]))
+        column += width + (int(rng.integers(0, 120)) if rng.random() < 0.35 else 0)

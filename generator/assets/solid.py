@@ -16,7 +16,7 @@ WELD_M = 1e-6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """A closed triangle mesh: `vertices` (N,3), `uv` (N,2) in 0..1 within its material, `faces` (M,3) seen counter-clockwise."""
+    """A closed mesh: `vertices` (N,3), `uv` (N,2) in 0..1 within its material, `faces` (M,3) seen counter-clockwise."""
 
     vertices: Floats
     uv: Floats
@@ -45,11 +45,16 @@ class Solid:
         return replace(self, labelled=False)
 
 
+def vector(x: float, y: float, z: float) -> Floats:
+    """A vector (3,)."""
+    return np.array([x, y, z], dtype=float)
+
+
 def rotation(axis: ArrayLike, angle_rad: float) -> Floats:
     """Rotation matrix (3,3) about `axis` (Rodrigues)."""
     x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross
+    return np.asarray(np.eye(3) + np.sin(angle_rad) * cross + (1 - np.cos(angle_rad)) * cross @ cross)
 
 
 def welded(vertices: Floats) -> Ints:

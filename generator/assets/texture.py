@@ -20,7 +20,7 @@ def hsv(hue: float, saturation: float, value: float) -> Colour:
 
 def grey(rng: np.random.Generator, low: float, high: float) -> Colour:
     """A nearly neutral colour whose brightness lies between `low` and `high` (0..1)."""
-    return np.clip(rng.uniform(low, high) * 255 + rng.normal(0, 3, 3), 0, 255)
+    return np.asarray(np.clip(rng.uniform(low, high) * 255 + rng.normal(0, 3, 3), 0, 255))
 
 
 def vivid(rng: np.random.Generator, low: float = 0.25, high: float = 1.0) -> Colour:
@@ -30,10 +30,12 @@ def vivid(rng: np.random.Generator, low: float = 0.25, high: float = 1.0) -> Col
 
 def pick(rng: np.random.Generator, options: Sequence[ArrayLike]) -> Colour:
     """One of several colours."""
-    return np.asarray(options[rng.integers(len(options))], float)
+    return np.asarray(options[int(rng.integers(len(options)))], np.float64)
 
 
-def noise(rng: np.random.Generator, height_px: int, width_px: int, octaves: int = 4, cells: int = 2) -> NDArray[np.float64]:
+def noise(
+    rng: np.random.Generator, height_px: int, width_px: int, octaves: int = 4, cells: int = 2
+) -> NDArray[np.float64]:
     """Smooth noise (height_px, width_px) in 0..1 that tiles in both directions, from `cells` blobs across upwards."""
     total = np.zeros((height_px, width_px))
     for octave in range(octaves):
@@ -42,7 +44,7 @@ def noise(rng: np.random.Generator, height_px: int, width_px: int, octaves: int 
             break
         total += _tiling(rng.random((across, across)), height_px, width_px) / 2**octave
     span = np.ptp(total)
-    return (total - total.min()) / (span if span > 0 else 1.0)
+    return np.asarray((total - total.min()) / (span if span > 0 else 1.0))
 
 
 def _tiling(coarse: NDArray[np.float64], height_px: int, width_px: int) -> NDArray[np.float64]:
@@ -68,7 +70,7 @@ def look_up(
 
 def to_image(values: ArrayLike) -> Image:
     """Values of any range as 8-bit pixels."""
-    return np.clip(np.rint(np.asarray(values, float)), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(np.rint(np.asarray(values, float)), 0, 255), np.uint8)
 
 
 def plain(rng: np.random.Generator, colour: ArrayLike, size_px: int = 32, mottle: float = 0.12) -> Image:
@@ -148,7 +150,9 @@ def rectangle(image: Image, low_uv: tuple[float, float], high_uv: tuple[float, f
 def ellipse(image: Image, centre_uv: tuple[float, float], radii_uv: tuple[float, float], colour: ArrayLike) -> None:
     """Fill an ellipse in texture coordinates."""
     angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
-    polygon(image, np.asarray(centre_uv) + np.column_stack([np.cos(angle), np.sin(angle)]) * np.asarray(radii_uv), colour)
+    polygon(
+        image, np.asarray(centre_uv) + np.column_stack([np.cos(angle), np.sin(angle)]) * np.asarray(radii_uv), colour
+    )
 
 
 def weathered(rng: np.random.Generator, image: Image, amount: float = 0.12) -> Image:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from generator.assets.asset import AssetClass
+from generator.assets.asset import AssetClass, Variant
 from generator.assets.section import Box, Section
 from generator.assets.shapes import box, limb
 from generator.assets.solid import Solid
@@ -12,7 +12,7 @@ FRAME_LENGTH_M, FRAME_WIDTH_M, FRAME_Y_M = 0.38, 0.07, 0.58
 SEAT_M = 0.44
 
 
-def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
+def shape(rng: np.random.Generator) -> list[Solid]:
     """A bench of 1.4 to 1.9 m that faces +x."""
     length = rng.uniform(1.4, 1.9)
     slats, boards = int(rng.integers(3, 6)), int(rng.integers(2, 5))
@@ -48,7 +48,7 @@ def _frame(lean: float, arms: bool) -> list[Solid]:
     return solids
 
 
-def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
+def paint(rng: np.random.Generator) -> dict[str, Image]:
     """Wood, or green paint, on iron or stone."""
     wood = hsv(rng.uniform(0.05, 0.1), rng.uniform(0.4, 0.75), rng.uniform(0.35, 0.75))
     boards = pick(rng, (wood, wood, wood, hsv(0.36, 0.5, 0.35), grey(rng, 0.4, 0.6)))
@@ -60,4 +60,4 @@ def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
 
 
 FEET = (Box(FRAME_LENGTH_M, FRAME_WIDTH_M, y_m=FRAME_Y_M), Box(FRAME_LENGTH_M, FRAME_WIDTH_M, y_m=-FRAME_Y_M))
-CLASS = AssetClass("bench", 13, {"standard": Section(FEET)}, shape, paint)
+CLASS = AssetClass("bench", 13, {"standard": Variant(Section(FEET), shape, paint)})

@@ -1,12 +1,11 @@
 """Bicycle: diamond frame, two wheels with spokes, saddle, handlebars, chain ring, cranks and pedals."""
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from generator.assets.asset import AssetClass
+from generator.assets.asset import AssetClass, Variant
 from generator.assets.section import Box, Section
 from generator.assets.shapes import box, ellipsoid, limb, torus
-from generator.assets.solid import Floats, Solid
+from generator.assets.solid import Floats, Solid, vector
 from generator.assets.texture import Image, grey, pick, plain, vivid
 
 WHEEL_M, BASE_M = 0.34, 1.04
@@ -15,13 +14,13 @@ TYRE_M = 0.022
 MEETING_M, MEETING_LENGTH_M = 0.262, 0.06
 
 
-def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
+def shape(rng: np.random.Generator) -> list[Solid]:
     """A bicycle that points along +x."""
     rear, front = np.array([-BASE_M / 2, 0, WHEEL_M]), np.array([BASE_M / 2, 0, WHEEL_M])
     crank = np.array([-0.07, 0, 0.29])
     seat = np.array([-0.2, 0, rng.uniform(0.70, 0.82)])
     neck = np.array([BASE_M / 2 - 0.2, 0, rng.uniform(0.78, 0.86)])
-    fork = neck + (0.04, 0, -0.14)
+    fork = neck + vector(0.04, 0, -0.14)
     slope = np.array([0, 0, rng.choice([0.0, rng.uniform(-0.2, -0.05)])])
     solids = _wheel(rear) + _wheel(front)
     frame = [(crank, seat, 0.019), (seat + slope, neck, 0.018), (crank, fork, 0.022), (fork, neck, 0.022)]
@@ -37,48 +36,57 @@ def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
 def _wheel(centre: Floats) -> list[Solid]:
     """Tyre, rim, hub and spokes."""
     solids = [
-        torus(WHEEL_M - TYRE_M, TYRE_M, "tyre", 24, 5),
-        torus(WHEEL_M - 2 * TYRE_M, 0.010, "metal", 24, 4),
+        torus(WHEEL_M - TYRE_M, TYRE_M, "tyre", 22, 5),
+        torus(WHEEL_M - 2 * TYRE_M, 0.010, "metal", 20, 4),
         limb([(0, -0.045, 0), (0, 0.045, 0)], 0.022, "metal", 6),
     ]
-    for turn in range(10):
-        angle = turn * np.pi / 5 + 0.3
+    for turn in range(8):
+        angle = turn * np.pi / 4 + 0.3
         tip = (WHEEL_M - 2 * TYRE_M) * np.array([np.cos(angle), 0, np.sin(angle)])
-        solids.append(limb([(0, 0, 0), tip], 0.003, "metal", 3))
+        solids.append(limb([vector(0, 0, 0), tip], 0.003, "metal", 3))
     return [solid.moved(*centre) for solid in solids]
 
 
-def _saddle(seat: ArrayLike) -> list[Solid]:
+def _saddle(seat: Floats) -> list[Solid]:
     """Seat post and saddle."""
-    top = np.asarray(seat, float) + (-0.03, 0, 0.12)
-    return [limb([seat, top], 0.014, "metal", 6), ellipsoid(0.28, 0.15, 0.07, "rubber", 10, 6).moved(*(top + (0, 0, 0.02)))]
+    top = seat + vector(-0.03, 0, 0.12)
+    return [
+        limb([seat, top], 0.014, "metal", 6),
+        ellipsoid(0.28, 0.15, 0.07, "rubber", 10, 6).moved(*(top + vector(0, 0, 0.02))),
+    ]
 
 
-def _handlebars(neck: ArrayLike, dropped: bool) -> list[Solid]:
+def _handlebars(neck: Floats, dropped: bool) -> list[Solid]:
     """A stem and a straight or a dropped bar."""
-    top = np.asarray(neck, float) + (-0.02, 0, 0.10)
-    solids = [limb([neck, top], 0.017, "metal", 6), limb([top - (0, 0.27, 0), top + (0, 0.27, 0)], 0.014, "metal", 6)]
+    top = neck + vector(-0.02, 0, 0.10)
+    solids = [
+        limb([neck, top], 0.017, "metal", 6),
+        limb([top - vector(0, 0.27, 0), top + vector(0, 0.27, 0)], 0.014, "metal", 6),
+    ]
     for y in (0.27, -0.27):
-        end = top + (0, y, 0)
+        end = top + vector(0, y, 0)
         if dropped:
-            bend = [end, end + (0.09, 0, -0.01), end + (0.10, 0, -0.09), end + (0.02, 0, -0.12)]
+            bend = [end, end + vector(0.09, 0, -0.01), end + vector(0.10, 0, -0.09), end + vector(0.02, 0, -0.12)]
             solids.append(limb(bend, 0.016, "rubber", 6))
         else:
-            solids.append(limb([end - (0, 0.4 * y, 0), end + (-0.03, 0.15 * y, 0)], 0.02, "rubber", 6))
+            solids.append(limb([end - vector(0, 0.4 * y, 0), end + vector(-0.03, 0.15 * y, 0)], 0.02, "rubber", 6))
     return solids
 
 
 def _cranks(crank: Floats) -> list[Solid]:
     """Chain ring and level cranks with their pedals."""
-    solids = [torus(0.085, 0.011, "metal", 14, 4).moved(*(crank + (0, -0.05, 0)))]
+    solids = [torus(0.085, 0.011, "metal", 14, 4).moved(*(crank + vector(0, -0.05, 0)))]
     for side in (1, -1):
-        start = crank + (0, side * 0.03, 0)
-        end = crank + (side * 0.16, side * 0.09, 0)
-        solids += [limb([start, end], 0.011, "metal", 5), box(0.09, 0.09, 0.025, "rubber").moved(*(end + (0, side * 0.05, 0)))]
+        start = crank + vector(0, side * 0.03, 0)
+        end = crank + vector(side * 0.16, side * 0.09, 0)
+        solids += [
+            limb([start, end], 0.011, "metal", 5),
+            box(0.09, 0.09, 0.025, "rubber").moved(*(end + vector(0, side * 0.05, 0))),
+        ]
     return solids
 
 
-def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
+def paint(rng: np.random.Generator) -> dict[str, Image]:
     """A coloured frame; everything else black or metal."""
     return {
         "frame": plain(rng, pick(rng, (vivid(rng, 0.4), vivid(rng, 0.4), grey(rng, 0.05, 0.95))), mottle=0.05),
@@ -89,4 +97,4 @@ def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
 
 
 PATCHES = tuple(Box(MEETING_LENGTH_M, 2 * TYRE_M, x * BASE_M / 2 + y * MEETING_M) for x in (1, -1) for y in (1, -1))
-CLASS = AssetClass("bicycle", 1, {"standard": Section(PATCHES)}, shape, paint)
+CLASS = AssetClass("bicycle", 1, {"standard": Variant(Section(PATCHES), shape, paint)})

@@ -1,14 +1,27 @@
 """Car: a saloon, a hatchback or an estate, its body a loft with painted windows, doors and wheel arches."""
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from generator.assets import section
-from generator.assets.asset import AssetClass
+from generator.assets.asset import AssetClass, Variant
 from generator.assets.shapes import box, lathe, loft
 from generator.assets.solid import Floats, Solid
-from generator.assets.texture import Image, canvas, ellipse, grey, hsv, pick, plain, polygon, rectangle, to_image, weathered
+from generator.assets.texture import (
+    Image,
+    canvas,
+    ellipse,
+    grey,
+    hsv,
+    pick,
+    plain,
+    polygon,
+    rectangle,
+    to_image,
+    weathered,
+)
 
 LENGTH_M, WIDTH_M, CORNER_M = 4.2, 1.74, 0.30
 FLOOR_M, ROOF_M = 0.10, 1.42
@@ -40,14 +53,14 @@ OUTLINES = {
 }
 
 
-def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
+def shape(outline: Outline, rng: np.random.Generator) -> list[Solid]:
     """A car that points along +x."""
-    solids = [_body(OUTLINES[variant], rng.uniform(-0.03, 0.05))]
+    solids = [_body(outline, rng.uniform(-0.03, 0.05))]
     end = LENGTH_M / 2
     solids.append(_panel("front", 1.14, 0.42, 0.45).moved(end))
     solids.append(_panel("rear", 1.14, 0.50, 0.48).turned((0, 0, 1), np.pi).moved(-end))
     for x in AXLES_M:
-        wheel = _wheel().moved(x, WIDTH_M / 2 - 0.096, WHEEL_M)
+        wheel = _wheel().moved(x, WIDTH_M / 2 - 0.097, WHEEL_M)
         solids += [wheel, wheel.mirrored()]
     mirror = box(0.12, 0.16, 0.11, "paint").moved(0.72, WIDTH_M / 2 + 0.02, 0.98)
     return [*solids, mirror, mirror.mirrored()]
@@ -56,9 +69,14 @@ def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
 def _body(outline: Outline, lift: float) -> Solid:
     """The body: rings across the car, from the tail to the nose."""
     end = LENGTH_M / 2
-    turn = np.linspace(0, np.pi / 2, 5)
+    turn = np.linspace(0, np.pi / 2, 6)
     rounded_x, inset = end - CORNER_M * (1 - np.sin(turn)), CORNER_M * (1 - np.cos(turn))
-    foot, top, rear_top, rear_foot = outline.screen_foot_m, outline.screen_top_m, outline.rear_top_m, outline.rear_foot_m
+    foot, top, rear_top, rear_foot = (
+        outline.screen_foot_m,
+        outline.screen_top_m,
+        outline.rear_top_m,
+        outline.rear_foot_m,
+    )
     roof_x = [rear_top, rear_top + 0.15, 0.5 * (rear_top + top), top - 0.15, top]
     roof_z = np.array([ROOF_M - 0.05, ROOF_M - 0.01, ROOF_M + 0.03, ROOF_M + 0.01, ROOF_M - 0.03]) + lift
     top_x = [-end, -end + 0.05, rear_foot, *roof_x, foot, 1.6, 1.9, end - 0.08, end]
@@ -96,12 +114,12 @@ def _wheel() -> Solid:
     return Solid(wheel.vertices, uv, wheel.faces, "wheel")
 
 
-def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
+def paint(outline: Outline, rng: np.random.Generator) -> dict[str, Image]:
     """Car colours as they are on the road: white, silver, black, and some blue, red and others."""
     strong = hsv(rng.choice([0.6, 0.6, 0.0, 0.0, rng.random()]), rng.uniform(0.6, 0.9), rng.uniform(0.25, 0.7))
     colour = pick(rng, (grey(rng, 0.8, 0.97), grey(rng, 0.45, 0.7), grey(rng, 0.45, 0.7), grey(rng, 0.08, 0.2), strong))
     return {
-        "body": weathered(rng, _glossed(_painted_body(OUTLINES[variant], colour)), 0.04),
+        "body": weathered(rng, _glossed(_painted_body(outline, colour)), 0.04),
         "front": _front(colour),
         "rear": _rear(colour),
         "wheel": _painted_wheel(grey(rng, 0.5, 0.8)),
@@ -123,7 +141,12 @@ def _glossed(image: Image) -> Image:
 def _painted_body(outline: Outline, colour: Floats) -> Image:
     """Windows, doors, arches, dark sills and the lights' outer ends, in the loft's own coordinates."""
     right = canvas(colour, 256, 256)
-    foot, top, rear_top, rear_foot = outline.screen_foot_m, outline.screen_top_m, outline.rear_top_m, outline.rear_foot_m
+    foot, top, rear_top, rear_foot = (
+        outline.screen_foot_m,
+        outline.screen_top_m,
+        outline.rear_top_m,
+        outline.rear_foot_m,
+    )
     seam = 0.7 * colour
     post = 0.5 * (top + rear_top) + 0.12
     rectangle(right, (0.0, 0.0), (_u(0.23), 1.0), DARK)
@@ -139,7 +162,12 @@ def _painted_body(outline: Outline, colour: Floats) -> Image:
         [(low, foot - 0.2), (high, top - 0.02), (high, post + 0.04), (low, post + 0.04)],
         [(low, post - 0.04), (high, post - 0.04), (high, rear_top + 0.06), (low, rear_low + 0.06)],
         [(ROOF_U + 0.012, foot - 0.05), (0.5, foot - 0.05), (0.5, top + 0.03), (ROOF_U + 0.012, top + 0.03)],
-        [(ROOF_U + 0.014, rear_foot + 0.03), (0.5, rear_foot + 0.03), (0.5, rear_top - 0.03), (ROOF_U + 0.014, rear_top - 0.03)],
+        [
+            (ROOF_U + 0.014, rear_foot + 0.03),
+            (0.5, rear_foot + 0.03),
+            (0.5, rear_top - 0.03),
+            (ROOF_U + 0.014, rear_top - 0.03),
+        ],
     ):
         polygon(right, [(u, _v(x)) for u, x in corners], GLASS)
     polygon(right, [(_u(0.60), _v(1.82)), (_u(0.60), 1.0), (_u(0.84), 1.0), (_u(0.74), _v(1.80))], HEADLIGHT)
@@ -191,4 +219,6 @@ def _painted_wheel(metal: Floats) -> Image:
     return image
 
 
-CLASS = AssetClass("car", 2, dict.fromkeys(OUTLINES, section.box(LENGTH_M, WIDTH_M, CORNER_M)), shape, paint)
+SECTION = section.box(LENGTH_M, WIDTH_M, CORNER_M)
+VARIANTS = {name: Variant(SECTION, partial(shape, line), partial(paint, line)) for name, line in OUTLINES.items()}
+CLASS = AssetClass("car", 2, VARIANTS)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from generator.assets import section
-from generator.assets.asset import AssetClass
+from generator.assets.asset import AssetClass, Variant
 from generator.assets.shapes import box, lathe, limb, rounded_box
 from generator.assets.solid import Solid
 from generator.assets.texture import Image, grey, hsv, pick, plain, vivid, wooden
@@ -11,7 +11,7 @@ from generator.assets.texture import Image, grey, hsv, pick, plain, vivid, woode
 LEG_M, LENGTH_M, WIDTH_M = 0.022, 0.38, 0.38
 
 
-def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
+def shape(rng: np.random.Generator) -> list[Solid]:
     """A chair that faces +x, its seat at 0.43 to 0.48 m, its back 0.4 to 0.55 m higher."""
     seat, back = rng.uniform(0.43, 0.48), rng.uniform(0.40, 0.55)
     solids = [rounded_box(0.46, 0.46, 0.045, 0.04, "seat", 0.015).moved(z_m=seat)]
@@ -38,8 +38,8 @@ def _back(rng: np.random.Generator, seat: float, back: float) -> list[Solid]:
         parts = [(0.03, 0.40, back * 0.62, 0.66)]
     else:
         parts = [(0.03, 0.40, back * 0.16, 0.92)]
-        for y in (-0.12, -0.04, 0.04, 0.12):
-            spindle = [(-LENGTH_M / 2, y, 0.0), (-LENGTH_M / 2 - back * lean * 0.9, y, back * 0.9)]
+        for offset in (-0.12, -0.04, 0.04, 0.12):
+            spindle = [(-LENGTH_M / 2, offset, 0.0), (-LENGTH_M / 2 - back * lean * 0.9, offset, back * 0.9)]
             solids.append(limb(spindle, 0.011, "frame", 6).moved(z_m=seat))
     for depth, width, height, share in parts:
         board = box(depth, width, height, "seat").turned((0, 1, 0), -np.arctan(lean))
@@ -47,13 +47,16 @@ def _back(rng: np.random.Generator, seat: float, back: float) -> list[Solid]:
     return solids
 
 
-def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
+def paint(rng: np.random.Generator) -> dict[str, Image]:
     """Wood, or a coloured seat on a painted or metal frame."""
     wood = hsv(rng.uniform(0.05, 0.1), rng.uniform(0.45, 0.7), rng.uniform(0.3, 0.75))
     if rng.random() < 0.5:
         return {"seat": wooden(rng, wood), "frame": wooden(rng, 0.85 * wood)}
     colour = pick(rng, (vivid(rng), grey(rng, 0.08, 0.3), grey(rng, 0.7, 0.95)))
-    return {"seat": plain(rng, colour, 64), "frame": plain(rng, pick(rng, (grey(rng, 0.05, 0.25), grey(rng, 0.6, 0.85), 0.8 * wood)))}
+    return {
+        "seat": plain(rng, colour, 64),
+        "frame": plain(rng, pick(rng, (grey(rng, 0.05, 0.25), grey(rng, 0.6, 0.85), 0.8 * wood))),
+    }
 
 
-CLASS = AssetClass("chair", 56, {"standard": section.four_legs(LEG_M, LENGTH_M, WIDTH_M)}, shape, paint)
+CLASS = AssetClass("chair", 56, {"standard": Variant(section.four_legs(LEG_M, LENGTH_M, WIDTH_M), shape, paint)})

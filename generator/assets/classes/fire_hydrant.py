@@ -3,7 +3,7 @@
 import numpy as np
 
 from generator.assets import section
-from generator.assets.asset import AssetClass
+from generator.assets.asset import AssetClass, Variant
 from generator.assets.shapes import lathe
 from generator.assets.solid import Solid
 from generator.assets.texture import Image, grey, hsv, pick, plain
@@ -11,7 +11,7 @@ from generator.assets.texture import Image, grey, hsv, pick, plain
 BARREL_M = 0.15
 
 
-def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
+def shape(rng: np.random.Generator) -> list[Solid]:
     """A hydrant of 0.75 to 0.95 m; the barrel's radius is fixed."""
     tall = rng.uniform(0.88, 1.1)
     r, shoulder = BARREL_M, 0.56 * tall
@@ -25,9 +25,9 @@ def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
         lathe([(0.30 * r, 0), (0.26 * r, 0.065)], "nut", sides=5).moved(z_m=shoulder + 0.05 + 0.15 * bonnet),
     ]
     for turn in range(8):
-        bolt = lathe([(0.018, 0.03), (0.018, 0.06)], "nut", sides=6).moved(1.27 * r)
+        bolt = lathe([(0.018, 0.03), (0.018, 0.06)], "nut", sides=5).moved(1.27 * r)
         solids.append(bolt.turned((0, 0, 1), (turn + 0.5) * np.pi / 4))
-        top = lathe([(0.014, -0.012), (0.014, 0.062)], "nut", sides=5).moved(1.19 * r, z_m=shoulder)
+        top = lathe([(0.014, -0.012), (0.014, 0.062)], "nut", sides=4).moved(1.19 * r, z_m=shoulder)
         solids.append(top.turned((0, 0, 1), (turn + 0.5) * np.pi / 4))
     height = shoulder - rng.uniform(0.1, 0.13) * tall
     solids += _nozzle(0.058, height, np.pi / 2) + _nozzle(0.058, height, -np.pi / 2) + _nozzle(0.082, height - 0.03, 0)
@@ -52,13 +52,17 @@ def _nozzle(radius: float, height: float, heading: float) -> list[Solid]:
     ]
 
 
-def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
+def paint(rng: np.random.Generator) -> dict[str, Image]:
     """Mostly red or yellow, caps often in another colour."""
     red = hsv(rng.uniform(-0.02, 0.02), rng.uniform(0.8, 1), rng.uniform(0.6, 0.95))
     yellow = hsv(rng.uniform(0.12, 0.16), rng.uniform(0.8, 1), rng.uniform(0.75, 1))
     body = pick(rng, (red, red, red, yellow, yellow, grey(rng, 0.65, 0.95), hsv(rng.uniform(0.56, 0.62), 0.75, 0.7)))
     cap = pick(rng, (body, body, 0.85 * body, grey(rng, 0.65, 0.95), yellow, hsv(0.6, 0.8, 0.65), hsv(0.35, 0.7, 0.5)))
-    return {"body": plain(rng, body, 64), "cap": plain(rng, cap), "nut": plain(rng, pick(rng, (0.75 * cap, grey(rng, 0.3, 0.7))))}
+    return {
+        "body": plain(rng, body, 64),
+        "cap": plain(rng, cap),
+        "nut": plain(rng, pick(rng, (0.75 * cap, grey(rng, 0.3, 0.7)))),
+    }
 
 
-CLASS = AssetClass("fire hydrant", 10, {"standard": section.disc(BARREL_M)}, shape, paint)
+CLASS = AssetClass("fire hydrant", 10, {"standard": Variant(section.disc(BARREL_M), shape, paint)})

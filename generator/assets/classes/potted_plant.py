@@ -3,7 +3,7 @@
 import numpy as np
 
 from generator.assets import section
-from generator.assets.asset import AssetClass
+from generator.assets.asset import AssetClass, Variant
 from generator.assets.shapes import lathe, sheet
 from generator.assets.solid import Solid
 from generator.assets.texture import Image, grey, hsv, pick, plain, vivid
@@ -11,7 +11,7 @@ from generator.assets.texture import Image, grey, hsv, pick, plain, vivid
 POT_M = 0.18
 
 
-def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
+def shape(rng: np.random.Generator) -> list[Solid]:
     """A pot of 0.28 to 0.36 m and leaves that reach 0.4 to 0.8 m above it."""
     rim = rng.uniform(0.28, 0.36)
     pot = [(0.86 * POT_M, 0), (0.985 * POT_M, 0.1), (1.02 * POT_M, 0.21), (1.05 * POT_M, rim - 0.05)]
@@ -30,7 +30,7 @@ def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
 
 
 def _leaf(rng: np.random.Generator, length: float, tilt: float, material: str) -> Solid:
-    """A leaf that rises from the origin, `tilt` off the vertical, and bends over towards +x; folded along its middle."""
+    """A leaf that rises from the origin, `tilt` off the vertical, and bends over to +x; folded along its middle."""
     along = np.linspace(0, 1, 6)
     angle = tilt * (0.5 + 1.1 * along)
     step = length / (len(along) - 1)
@@ -39,11 +39,13 @@ def _leaf(rng: np.random.Generator, length: float, tilt: float, material: str) -
     half = length * rng.uniform(0.08, 0.14) * np.sin(np.pi * (0.1 + 0.9 * along)) ** 0.8
     points = np.empty((len(along), 3, 3))
     for index, side in enumerate((-1.0, 0.0, 1.0)):
-        points[:, index] = np.column_stack([x - abs(side) * half * 0.3 * np.cos(angle), side * half, z + abs(side) * half * 0.3])
+        points[:, index] = np.column_stack(
+            [x - abs(side) * half * 0.3 * np.cos(angle), side * half, z + abs(side) * half * 0.3]
+        )
     return sheet(points, material)
 
 
-def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
+def paint(rng: np.random.Generator) -> dict[str, Image]:
     """Greens of two tones; pots of clay, or in any colour."""
     green = hsv(rng.uniform(0.23, 0.36), rng.uniform(0.5, 0.85), rng.uniform(0.3, 0.65))
     clay = hsv(rng.uniform(0.03, 0.06), rng.uniform(0.5, 0.7), rng.uniform(0.55, 0.8))
@@ -55,4 +57,4 @@ def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
     }
 
 
-CLASS = AssetClass("potted plant", 58, {"standard": section.disc(POT_M)}, shape, paint)
+CLASS = AssetClass("potted plant", 58, {"standard": Variant(section.disc(POT_M), shape, paint)})

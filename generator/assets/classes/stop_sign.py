@@ -1,10 +1,12 @@
 """Stop sign: a red octagon with white border and letters, on a post that stands in the ground or in a round foot."""
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from generator.assets import section
-from generator.assets.asset import AssetClass
+from generator.assets.asset import AssetClass, Variant
 from generator.assets.shapes import lathe, stack
 from generator.assets.solid import Floats, Solid
 from generator.assets.texture import Image, canvas, grey, hsv, pick, plain, polygon, stroke, weathered
@@ -28,7 +30,7 @@ _LETTERS: tuple[list[ArrayLike], ...] = (
 )
 
 
-def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
+def shape(footed: bool, rng: np.random.Generator) -> list[Solid]:
     """A sign 0.75 to 0.9 m across, its face towards +x, its lower edge 1.2 to 1.7 m above ground."""
     half = rng.uniform(0.375, 0.45)
     centre = rng.uniform(1.2, 1.7) + half
@@ -36,7 +38,7 @@ def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
     back = _plate(half * 0.995, "back").moved(POST_M, z_m=centre)
     post = lathe([(POST_M, 0.0), (POST_M, centre + 0.8 * half)], "post", sides=12).unlabelled()
     solids = [face, back, post]
-    if variant == "foot":
+    if footed:
         foot = [(FOOT_M, 0.0), (FOOT_M, 0.24), (0.8 * FOOT_M, 0.29), (POST_M, 0.30)]
         solids.append(lathe(foot, "foot", sides=24).unlabelled())
     return solids
@@ -57,10 +59,10 @@ def _plate(half: float, material: str) -> Solid:
 def _octagon() -> Floats:
     """An octagon with edges at x, y = +-1."""
     angle = np.pi / 8 + np.pi / 4 * np.arange(8)
-    return np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / 8)
+    return np.asarray(np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / 8))
 
 
-def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
+def paint(rng: np.random.Generator) -> dict[str, Image]:
     """The face as prescribed, faded by its seed; letters a third of the sign's height."""
     red = hsv(rng.uniform(-0.01, 0.012), rng.uniform(0.82, 0.97), rng.uniform(0.68, 0.88))
     face = canvas((238, 238, 238), 512, 512)
@@ -77,4 +79,8 @@ def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
     }
 
 
-CLASS = AssetClass("stop sign", 11, {"post": section.disc(POST_M), "foot": section.disc(FOOT_M)}, shape, paint)
+VARIANTS = {
+    "post": Variant(section.disc(POST_M), partial(shape, False), paint),
+    "foot": Variant(section.disc(FOOT_M), partial(shape, True), paint),
+}
+CLASS = AssetClass("stop sign", 11, VARIANTS)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from generator.assets import section
-from generator.assets.asset import AssetClass
-from generator.assets.shapes import box, circle, lathe, rounded_box, stack, surface
+from generator.assets.asset import AssetClass, Variant
+from generator.assets.shapes import box, lathe, rounded_box, surface
 from generator.assets.solid import Solid
 from generator.assets.texture import Image, canvas, ellipse, grey, hsv, pick, plain, to_image
 
@@ -13,7 +13,7 @@ LAMPS = ("red", "amber", "green")
 GLOW = {"red": (255, 45, 30), "amber": (255, 185, 40), "green": (60, 255, 140)}
 
 
-def shape(variant: str, rng: np.random.Generator) -> list[Solid]:
+def shape(rng: np.random.Generator) -> list[Solid]:
     """A housing of 0.9 to 1.1 m above a pole, its lamps towards +x, with or without a backplate."""
     scale = rng.uniform(0.9, 1.1)
     width, depth, height = 0.34 * scale, 0.22 * scale, 1.0 * scale
@@ -47,22 +47,19 @@ def _facing(solid: Solid) -> Solid:
 
 
 def _visor(radius: float, reach: float) -> Solid:
-    """An open tube cut off obliquely: long above the lens, short below."""
+    """A bent plate around the lens, open below: long above, short at its ends."""
     turn = np.linspace(np.deg2rad(-35), np.deg2rad(215), 15)
     rim = np.column_stack([np.cos(turn), np.sin(turn)])
     length = reach * np.clip(0.45 + 0.55 * np.sin(turn), 0.1, 1.0)
     rows = []
     for scale, depth in ((1.0, 0 * length), (1.0, length), (0.94, length), (0.94, 0 * length), (1.0, 0 * length)):
         rows.append(np.column_stack([depth, scale * radius * rim]))
-    return _closed_strip(np.array(rows))
+    plate = np.array(rows)
+    ends = [plate[:, [side]].mean(axis=0, keepdims=True).repeat(5, axis=0) for side in (0, -1)]
+    return surface(np.concatenate([ends[0], plate, ends[1]], axis=1), "housing")
 
 
-def _closed_strip(rows: np.ndarray) -> Solid:
-    """A bent plate from its outline's corners (5,N,3), closed at both ends."""
-    return surface(np.concatenate([rows[:, :1].mean(axis=0, keepdims=True).repeat(5, 0), rows], axis=1), "housing")
-
-
-def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
+def paint(rng: np.random.Generator) -> dict[str, Image]:
     """A black, dark green or yellow housing; one lamp is lit."""
     housing = pick(rng, (grey(rng, 0.04, 0.14), grey(rng, 0.04, 0.14), hsv(0.4, 0.4, 0.2), hsv(0.13, 0.85, 0.8)))
     lit = rng.choice(LAMPS, p=[0.45, 0.1, 0.45])
@@ -85,4 +82,4 @@ def _lens(colour: tuple[int, int, int], lit: bool) -> Image:
     return to_image(image)
 
 
-CLASS = AssetClass("traffic light", 9, {"standard": section.disc(FOOT_M)}, shape, paint)
+CLASS = AssetClass("traffic light", 9, {"standard": Variant(section.disc(FOOT_M), shape, paint)})

@@ -1,0 +1,1 @@
+"""Tests of the objects, grounds and skies."""
