@@ -1,11 +1,13 @@
 """The pieces that messages share: time stamps, headers, poses, covariances."""
 
+import math
+from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from toolkit.geometry.angles import quaternion_from_yaw, yaw_from_quaternion
+from toolkit.geometry.angles import yaw_from_quaternion
 from toolkit.messages.typestore import typestore
 
 Array = NDArray[np.float64]
@@ -14,7 +16,12 @@ PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
 
 def make(ros_type: str, **fields: Any) -> Any:
     """Object of the typestore; `geometry_msgs/Pose` is short for `geometry_msgs/msg/Pose`."""
-    return typestore().types[ros_type.replace("/", "/msg/")](**fields)
+    return _class(ros_type)(**fields)
+
+
+@cache
+def _class(ros_type: str) -> Any:
+    return typestore().types[ros_type.replace("/", "/msg/")]
 
 
 def stamp_to_ros(stamp_ns: int) -> Any:
@@ -84,7 +91,8 @@ def spread_planar(covariance: Array) -> Array:
 def planar_parts(pose_xyh: ArrayLike) -> tuple[Array, Array]:
     """Position (3,) and quaternion (4,) of a pose x, y, heading in the plane."""
     x, y, heading = np.asarray(pose_xyh, dtype=np.float64).tolist()
-    return np.array([x, y, 0.0]), quaternion_from_yaw(heading)
+    # As `quaternion_from_yaw`, without the cost of arrays for one angle.
+    return np.array([x, y, 0.0]), np.array([0.0, 0.0, math.sin(heading / 2), math.cos(heading / 2)])
 
 
 def planar_pose(position_m: Array, orientation_xyzw: Array) -> Array:
