@@ -1,0 +1,87 @@
+"""Makes a recording of a scenario: simulate, render, write."""
+
+import importlib.metadata
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from dataclasses import dataclass
+from pathlib import Path
+
+from generator.camera import ImageJob
+from generator.checks import Staged
+from generator.loading import effective
+from generator.rendering import Darkroom, Messages, picked_up
+from generator.simulation import Simulation
+from toolkit.errors import ToolkitError
+from toolkit.manifest import RUN, Manifest
+from toolkit.recording.writer import create_recording
+from toolkit.stage import Stamped
+
+_JOBS_PER_WORKER = 4
+_MOST_WAITING = 20_000
+"""Messages that wait for an image before them: some minutes of a log without images."""
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What was recorded: messages by topic, simulated time, and when the robot ran into which object."""
+
+    messages: dict[str, int]
+    simulated_s: float
+    collisions: tuple[tuple[float, str], ...]
+
+
+def record(staged: Staged, path: Path, workers: int = 1, progress: Callable[[int], None] = lambda _: None) -> Summary:
+    """Run a scenario and write what its sensors saw; the same scenario gives the same bytes, however many workers.
+
+    `progress` gets each full simulated second.
+
+    Raises:
+        ToolkitError: the robot got stuck, or the file cannot be written; no file is left then.
+    """
+    if not staged.scenario.trajectory.waypoints:
+        raise ToolkitError(f"{staged.name}: trajectory.waypoints is empty; one with stop_s records a standing robot")
+    simulation = Simulation(staged)
+    with Darkroom(staged, workers) as darkroom, create_recording(path, {RUN: manifest(staged).entries()}) as writer:
+        for message in _in_order(simulation.run(progress), darkroom, workers):
+            writer.add(message)
+        counts = dict(writer.counts)
+    collisions = tuple((time_ns / 1e9, name) for time_ns, name in simulation.collisions)
+    return Summary(counts, simulation.end_ns / 1e9, collisions)
+
+
+def manifest(staged: Staged) -> Manifest:
+    """What the recording is made from: every value of the scenario, the seed, the versions that shape its bytes."""
+    versions = {name: importlib.metadata.version(name) for name in ("pybullet", "opencv-python-headless", "numpy")}
+    return Manifest(
+        "generate",
+        config={"scenario": effective(staged.scenario)},
+        options={"scenario": staged.name, "versions": versions},
+        seed=staged.scenario.seed,
+    )
+
+
+def _in_order(events: Iterator[Stamped | ImageJob], darkroom: Darkroom, workers: int) -> Iterator[Stamped]:
+    """Messages in the order of the events, while the images behind the first one are being rendered."""
+    waiting: deque[Stamped | Future[Messages]] = deque()
+    jobs = 0
+    for event in events:
+        if isinstance(event, ImageJob):
+            waiting.append(darkroom.submit(event))
+            jobs += 1
+        else:
+            waiting.append(event)
+        while waiting and (_ready(waiting[0]) or jobs > _JOBS_PER_WORKER * workers or len(waiting) > _MOST_WAITING):
+            first = waiting.popleft()
+            jobs -= isinstance(first, Future)
+            yield from _messages(first)
+    for first in waiting:
+        yield from _messages(first)
+
+
+def _ready(item: "Stamped | Future[Messages]") -> bool:
+    return isinstance(item, Stamped) or item.done()
+
+
+def _messages(item: "Stamped | Future[Messages]") -> Messages:
+    return (item,) if isinstance(item, Stamped) else picked_up(item)

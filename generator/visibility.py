@@ -1,0 +1,73 @@
+"""Which objects an image shows, where, and how much of each: the truth about its detections."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from generator.assets.catalog import COCO_ID
+from generator.camera import View
+from generator.renderer import SUPERSAMPLING, Rendered, Renderer, Visible
+from generator.robot import OPTICAL_FRAME
+from toolkit.messages.detections import Detections
+
+_LEAST_AREA_PX = 4.0
+
+
+def true_detections(rendered: Rendered, renderer: Renderer, view: View, stamp_ns: int) -> Detections:
+    """Box of the visible labelled parts of each object, from the mask; the score is the visible share of them.
+
+    The share counts what other objects and the image's edges hide. Objects are left out that show less than 4 pixels.
+    """
+    names, options, boxes = [], [], []
+    for one in rendered.visible:
+        seen = _seen(rendered, one) if one.placed.asset.name in COCO_ID else None
+        if seen is None:
+            continue
+        share = 1.0
+        if seen.is_cut or _beyond_edge(one, renderer):
+            share = min(1.0, seen.area_px / max(renderer.silhouette_px(view, one), seen.area_px))
+        names.append(one.placed.object_id)
+        options.append(((one.placed.asset.name, round(share, 3)),))
+        boxes.append(seen.box_xyxy)
+    return Detections(stamp_ns, OPTICAL_FRAME, tuple(names), tuple(options), np.array(boxes, float).reshape(-1, 4))
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """Box and area, in pixels of the image, of what shows of an object; `is_cut`: other objects border on it."""
+
+    box_xyxy: tuple[float, float, float, float]
+    area_px: float
+    is_cut: bool
+
+
+def _seen(rendered: Rendered, one: Visible) -> _Seen | None:
+    """What an image shows of an object's labelled parts, None if hardly anything."""
+    inner = rendered.window
+    if inner is None:
+        return None
+    # Only its own window of the mask can show it.
+    left, top = max(one.window.left, inner.left), max(one.window.top, inner.top)
+    part = rendered.body_ids[
+        (top - inner.top) * SUPERSAMPLING : (one.window.bottom - inner.top) * SUPERSAMPLING,
+        (left - inner.left) * SUPERSAMPLING : (one.window.right - inner.left) * SUPERSAMPLING,
+    ]
+    mask = np.isin(part, [body.body_id for body in one.bodies if body.labelled])
+    area_px = int(mask.sum()) / SUPERSAMPLING**2
+    if area_px < _LEAST_AREA_PX:
+        return None
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    x = left + np.array([columns[0], columns[-1] + 1]) / SUPERSAMPLING
+    y = top + np.array([rows[0], rows[-1] + 1]) / SUPERSAMPLING
+    # Whatever hides a part of it borders on the rest.
+    border = cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool) & ~mask
+    is_cut = bool((part[border] >= 0).any())
+    return _Seen((float(x[0]), float(y[0]), float(x[1]), float(y[1])), area_px, is_cut)
+
+
+def _beyond_edge(one: Visible, renderer: Renderer) -> bool:
+    """Whether an object may reach beyond the image."""
+    width, height = renderer.size_px
+    window = one.window
+    return window.left < 0 or window.top < 0 or window.right > width or window.bottom > height
