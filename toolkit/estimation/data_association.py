@@ -4,6 +4,7 @@ An EKF over the robot's pose and every landmark (Dissanayake et al. 2001) keeps 
 towards what was just seen, wide towards what was left long ago. Only labels are taken from it; the graph does the rest.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ from scipy.stats import chi2
 from toolkit.geometry.se2 import Array, between, compose, rotation, transform_points
 
 _FAR = 1e9
+# Log density of an object that was not foreseen: somewhere on the 100 m by 100 m around the robot.
+_ANYWHERE = -math.log(100.0 * 100.0)
 UNLABELLED = -1
 
 
@@ -35,6 +38,7 @@ class LandmarkFilter:
         self.mean: Array = np.array(start, dtype=np.float64)
         self.covariance: Array = np.zeros((3, 3))
         self.kinds: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self.log_evidence = 0.0
         self._gates = gates
 
     def move(self, step: Array, step_covariance: Array) -> None:
@@ -66,6 +70,7 @@ class LandmarkFilter:
         labels[rows] = columns
         if len(rows):
             self._update(columns, points_xy[rows], covariances[rows])
+        self.log_evidence += _ANYWHERE * (len(kinds) - len(rows))
         fresh = (labels == UNLABELLED) & (distances.min(axis=1, initial=_FAR) > self._gates.new)
         for row in np.flatnonzero(fresh):
             labels[row] = self._insert(int(kinds[row]), points_xy[row], covariances[row])
@@ -130,7 +135,10 @@ class LandmarkFilter:
     def _update(self, landmarks: NDArray[np.int64], points_xy: Array, covariances: Array) -> None:
         miss, jacobian, noise = self._stack(landmarks, points_xy, covariances)
         cross = self.covariance @ jacobian.T
-        gain = np.linalg.solve(jacobian @ cross + noise, cross.T).T
+        spread = jacobian @ cross + noise
+        squared = float(miss @ np.linalg.solve(spread, miss))
+        self.log_evidence -= (squared + float(np.linalg.slogdet(spread)[1]) + len(miss) * math.log(2 * math.pi)) / 2
+        gain = np.linalg.solve(spread, cross.T).T
         self.mean = self.mean + gain @ miss
         self.covariance = self.covariance - gain @ cross.T
         self.covariance = (self.covariance + self.covariance.T) / 2
@@ -159,6 +167,19 @@ def _saved_by_leaving_out(solved: NDArray[np.floating], inverse: NDArray[np.floa
     return saved
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Labels:
+    """Landmark number (N,) per observation, `UNLABELLED` where unclear; the filter's poses (T, 3).
+
+    `log_evidence` is the log density of all observations given the noise that was assumed: the higher, the better the
+    assumption.
+    """
+
+    landmark: NDArray[np.int64]
+    poses: Array
+    log_evidence: float
+
+
 def label_observations(
     odom_from_base: Array,
     step_covariances: Array,
@@ -167,8 +188,8 @@ def label_observations(
     points_xy: Array,
     covariances: Array,
     gates: Gates = Gates(),
-) -> tuple[NDArray[np.int64], Array]:
-    """Landmark number (N,) of each of N observations (`UNLABELLED` where unclear), and the filter's poses (T, 3).
+) -> Labels:
+    """Label each of N observations made along T bundles with a landmark's number.
 
     odom_from_base (T, 3) with covariances (T - 1, 3, 3) of the steps between, in the base frame of each step's start;
     `bundle` (N,) rises and says in which of T each was seen; kinds (N,) are class numbers; points_xy (N, 2) and
@@ -186,4 +207,4 @@ def label_observations(
         if bounds[t] < bounds[t + 1]:
             labels[rows] = state.see(kinds[rows], points_xy[rows], covariances[rows])
         poses[t] = state.mean[:3]
-    return labels, poses
+    return Labels(labels, poses, state.log_evidence)

@@ -5,7 +5,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from toolkit.errors import MapError
 from toolkit.estimation.data_association import UNLABELLED
@@ -13,6 +12,7 @@ from toolkit.estimation.graph import KnownLandmarks, MapSolution, solve_map
 from toolkit.estimation.graph_log import LogSightings
 from toolkit.estimation.odometry import OdometryNoise
 from toolkit.estimation.sightings import polar_from_points
+from toolkit.estimation.support import confirmed
 from toolkit.geometry.se2 import Array
 from toolkit.landmarks.groups import groups_of
 from toolkit.landmarks.joining_logs import Numbering, number_landmarks
@@ -22,8 +22,8 @@ from toolkit.landmarks.observations import LogObservations, Trajectory
 
 Ints = NDArray[np.int64]
 
-# Squared Mahalanobis distance that two estimates of one place exceed once in a thousand.
-_SAME_PLACE = float(chi2.ppf(0.999, 2))
+# Below this weight the joint solution took a sighting for wrong.
+_WRONG = 0.1
 
 
 class Settings(Protocol):
@@ -107,13 +107,11 @@ def _map_of(
     settings: Settings,
 ) -> LandmarkMap:
     """The solved landmarks with how often, how large and in which groups they were seen."""
-    good = np.zeros(len(numbering.kinds), dtype=np.int64)
-    radii, measured = np.zeros(len(good)), np.zeros(len(good), dtype=np.int64)
+    radii, measured = np.zeros(len(numbering.kinds)), np.zeros(len(numbering.kinds), dtype=np.int64)
     sources = list(prior.sources) if prior else []
     for log, number, weight in zip(logs, numbers, solution.weights, strict=True):
         seen = np.flatnonzero(number != UNLABELLED)
-        fits = seen[weight > 0.5]
-        np.add.at(good, number[fits], 1)
+        fits = seen[weight > _WRONG]
         sized = fits[log.radii_m[fits] > 0]
         np.add.at(radii, number[sized], log.radii_m[sized])
         np.add.at(measured, number[sized], 1)
@@ -121,18 +119,16 @@ def _map_of(
     row = solution.number
     ids = [f"l{number + 1}" for number in row]
     radius = radii[row] / np.maximum(measured[row], 1)
-    sightings = good[row]
+    sightings = solution.sightings.copy()
     if prior is not None:
         ids = [*prior.ids, *(name for name in ids[len(prior) :])]
         sightings[: len(prior)] += prior.sightings
         radius[: len(prior)] = np.where(measured[: len(prior)] > 0, radius[: len(prior)], prior.radii_m)
     covariances = _definite(solution.covariance)
-    tentative = (sightings < settings.min_sightings) | _misread(
-        solution.landmarks_xy, covariances, sightings, settings.misread_share
-    )
+    sure = confirmed(solution.landmarks_xy, covariances, sightings, settings.min_sightings, settings.misread_share)
     if prior is not None:
-        tentative[: len(prior)] &= prior.tentative
-    confirmed = {int(number): ids[i] for i, number in enumerate(row) if not tentative[i]}
+        sure[: len(prior)] |= ~prior.tentative
+    name_of = {int(number): ids[i] for i, number in enumerate(row) if sure[i]}
     return LandmarkMap(
         tuple(ids),
         tuple(names[numbering.kinds[number]] for number in row),
@@ -140,24 +136,11 @@ def _map_of(
         covariances,
         radius,
         sightings,
-        tentative,
-        groups_of(logs, numbers, solution.trajectories, confirmed),
+        np.logical_not(sure),
+        groups_of(logs, numbers, solution.trajectories, name_of),
         tuple(sources),
         prior.frame if prior else "map",
     )
-
-
-def _misread(positions_xy: Array, covariances: Array, sightings: Ints, share: float) -> NDArray[np.bool_]:
-    """Landmarks (L,) that stand where another does that was seen far more often: it, under a wrong class.
-
-    Two objects cannot stand in one place, and who is taken for something else now and then stays where it is.
-    """
-    apart = positions_xy[:, None] - positions_xy
-    spread = covariances[:, None] + covariances
-    squared = np.einsum("lmi,lmi->lm", apart, np.linalg.solve(spread, apart[..., None])[..., 0])
-    hidden = (squared < _SAME_PLACE) & (sightings[:, None] < share * sightings)
-    misread: NDArray[np.bool_] = hidden.any(axis=1)
-    return misread
 
 
 def _definite(covariances: Array) -> Array:

@@ -35,9 +35,9 @@ class BuildMapConfig:
     odometry_heading_rad: float = 0.05
     odometry_turning_rad: float = 0.1
     slack: float = 1.7
-    robust_dof: float = 3.0
-    min_sightings: int = 5
-    misread_share: float = 0.05
+    robust_dof: float = 1.0
+    min_sightings: int = 3
+    misread_share: float = 0.1
     join_tolerance_m: float = 0.6
 
 
