@@ -108,12 +108,19 @@ def _export(outcome: "Outcome", truth: "Reference", pairing: "Pairing", tum: Pat
 
 
 def _print(document: dict[str, Any]) -> None:
-    if document["bundles"] or document["localized"]:
-        _print_counts(document)
-    if document["scored"]:
-        _print_poses(document)
-    if document["map"]:
-        _print_map(document["map"])
+    parts = [
+        part
+        for part, wanted in (
+            (_print_counts, document["bundles"] or document["localized"]),
+            (_print_poses, document["scored"]),
+            (_print_map, document["map"]),
+        )
+        if wanted
+    ]
+    for i, part in enumerate(parts):
+        if i:
+            say()
+        part(document)
 
 
 def _print_counts(document: dict[str, Any]) -> None:
@@ -124,7 +131,6 @@ def _print_counts(document: dict[str, Any]) -> None:
     rows.append(["false: over 1 m or 20 degrees", str(false["count"]), _percent(false["share"]) + " of scored"])
     rows.extend([f"status {name}", str(count), ""] for name, count in (document["statuses"] or {}).items())
     table(["bundles", "count", "share"], rows)
-    say()
 
 
 _COUNTS = ("bundles", "eligible", "localized", "scored")
@@ -165,10 +171,10 @@ def _print_poses(document: dict[str, Any]) -> None:
         moved = f"{fit['x_m']:.3f} m, {fit['y_m']:.3f} m, {fit['heading_deg']:.3f} deg"
         rows.append(["truth from estimate", moved])
     table(["figure", "value"], rows)
-    say()
 
 
-def _print_map(figures: dict[str, Any]) -> None:
+def _print_map(document: dict[str, Any]) -> None:
+    figures = document["map"]
     counts = ["landmarks", "reference", "matched", "missing", "spurious"]
     errors = [_metres(figures["rmse_aligned_m"]), _metres(figures["rmse_m"])]
     table(

@@ -30,6 +30,7 @@ class Outcome:
     """What a run gave: poses, bundles in all and by status, the map it used or made; None where it has none.
 
     eligible: how many of the bundles hold two distinct objects or more. seen: ids of the matched landmarks by time.
+    continuous: whether the poses are one path rather than each of its own.
     """
 
     trajectory: Trajectory
@@ -38,6 +39,7 @@ class Outcome:
     statuses: Mapping[str, int] | None = None
     landmarks: SceneObjects | None = None
     seen: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
+    continuous: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,30 @@
+"""The verb plot."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.compare.recordings import localized_log
+from toolkit.cli.console import DONE, PARTIAL, UNUSABLE, USAGE, run_command
+from toolkit.cli.main import build
+
+
+def run(*arguments: str | Path) -> int:
+    return run_command(build("plot"), ["plot", *map(str, arguments)])
+
+
+def test_a_picture_appears(tmp_path: Path) -> None:
+    log = localized_log(tmp_path / "r.mcap")
+    assert run(log, "-o", tmp_path / "r.PNG", "--align", "--title", "Run") == DONE
+    assert (tmp_path / "r.PNG").read_bytes().startswith(b"\x89PNG")
+
+
+def test_trouble_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = localized_log(tmp_path / "r.mcap")
+    assert run(log, "-o", tmp_path / "r.gif") == USAGE
+    assert "use .png, .svg, .pdf" in capsys.readouterr().err
+    assert run(tmp_path / "none.mcap", "-o", tmp_path / "r.png") == UNUSABLE
+    assert not (tmp_path / "r.png").exists()
+    log.write_bytes(log.read_bytes()[:-200])
+    assert run(log, "-o", tmp_path / "r.png") == PARTIAL
+    assert "warning: " in capsys.readouterr().err

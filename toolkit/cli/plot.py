@@ -1,0 +1,41 @@
+"""Plot maps and runs: landmarks, paths, positions and their errors."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from toolkit.cli import options
+from toolkit.cli.console import PARTIAL, progress, warn
+
+
+def command(
+    inputs: Annotated[
+        list[Path],
+        typer.Argument(metavar="INPUT...", help="Logs with results, a MAP.db, or results.txt as in Appendix D."),
+    ],
+    output: options.Output,
+    align: Annotated[
+        bool, typer.Option("--align", help="Move estimates by the SE(2) that fits the truth best.")
+    ] = False,
+    title: Annotated[str, typer.Option("--title", help="A line above the plot.")] = "",
+) -> None:
+    """Plot INPUT... into one picture (.png, .svg, .pdf): landmarks by class, paths, positions and their errors."""
+    from toolkit.atomic import atomic_file
+    from toolkit.errors import UsageError
+    from toolkit.report.drawing import gather
+    from toolkit.report.plots import FORMATS, save
+
+    form = output.suffix.lower().removeprefix(".")
+    if form not in FORMATS:
+        raise UsageError(
+            f"{output}: the name does not tell the format; use {', '.join(f'.{name}' for name in FORMATS)}"
+        )
+    with progress("read", sum(path.stat().st_size for path in inputs if path.is_file())) as advance:
+        drawing, losses = gather(inputs, aligned=align, progress=advance)
+    with atomic_file(output) as stream:
+        save(drawing, stream, form, title)
+    for loss in losses:
+        warn(f"warning: {loss}")
+    if losses:
+        raise typer.Exit(PARTIAL)

@@ -1,0 +1,1 @@
+"""Reports: plots of maps and runs."""
