@@ -39,9 +39,7 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
             os.fsync(stream.fileno())
         partial.replace(path)
     except OSError as error:
-        partial.unlink(missing_ok=True)
         reason = error.strerror or str(error)
         raise RecordingError(f"{path}: cannot be written ({reason}); free space or choose another place") from error
-    except BaseException:
+    finally:
         partial.unlink(missing_ok=True)
-        raise

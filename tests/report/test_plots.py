@@ -1,6 +1,7 @@
 """Plots show what there is, and the same input gives the same bytes."""
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +64,10 @@ def test_a_run_shows_positions_errors_and_what_is_false(log: Path) -> None:
 
 
 def test_a_map_shows_regions_and_groups(database: Path) -> None:
-    assert legend(database) == ["fire hydrant", "person", "suitcase", "95 % region", "robot at a group"]
+    assert legend(database) == ["fire hydrant", "person", "suitcase", "95 % region"]  # its groups share landmarks
+    apart = replace(small_map(), groups=small_map().groups[:1])
+    write_map(database, apart)
+    assert legend(database)[-1] == "robot at a group"
 
 
 def test_runs_are_told_apart(database: Path, log: Path, tmp_path: Path) -> None:

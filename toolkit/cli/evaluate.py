@@ -126,7 +126,8 @@ def _print(document: dict[str, Any]) -> None:
 def _print_counts(document: dict[str, Any]) -> None:
     eligible = document["eligible"]
     rows = [[name, str(document[name] if document[name] is not None else "-"), ""] for name in _COUNTS]
-    rows[2][2] = _percent(document["localized"] / eligible if eligible else None) + " of eligible"
+    whole, name = (document["bundles"], "bundles") if document["statuses"] is None else (eligible, "eligible")
+    rows[2][2] = _percent(document["localized"] / whole if whole else None) + f" of {name}"
     false = document["false"]
     rows.append(["false: over 1 m or 20 degrees", str(false["count"]), _percent(false["share"]) + " of scored"])
     rows.extend([f"status {name}", str(count), ""] for name, count in (document["statuses"] or {}).items())

@@ -93,8 +93,12 @@ def _draw_map(axes: Axes, drawing: Drawing) -> None:
 
 
 def _draw_groups(axes: Axes, groups: tuple[Group, ...], place: dict[str, Array]) -> None:
-    """Landmarks seen together as faint areas, and the poses that saw them, as in the thesis's figure 5.2."""
-    if not groups:
+    """Landmarks seen together as faint areas, and the poses that saw them, as in the thesis's figure 5.2.
+
+    Groups that share landmarks would be a tangle, and are not drawn.
+    """
+    members = [identity for group in groups for identity in group.landmark_ids]
+    if not groups or len(set(members)) < len(members):
         return
     areas = [np.array([place[name] for name in group.landmark_ids if name in place]) for group in groups]
     seen = [area for area in areas if len(area) > 2]
