@@ -10,9 +10,10 @@ from toolkit.landmarks.model import LandmarkMap
 
 
 def unique_classes(landmark_map: LandmarkMap) -> dict[str, int]:
-    """Row of the landmark of each class that no other landmark of the map has."""
-    counts = Counter(landmark_map.classes)
-    return {name: row for row, name in enumerate(landmark_map.classes) if counts[name] == 1}
+    """Row of the landmark of each class that no other confirmed landmark of the map has."""
+    rows = [int(row) for row in np.flatnonzero(~landmark_map.tentative)]
+    counts = Counter(landmark_map.classes[row] for row in rows)
+    return {landmark_map.classes[row]: row for row in rows if counts[landmark_map.classes[row]] == 1}
 
 
 def pairs_by_class(
