@@ -1,0 +1,218 @@
+"""The main job from the command line, and what it answers to bad input."""
+
+import dataclasses
+import json
+import resource
+import shutil
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+from tests.cli.logs import messages, write
+from toolkit.channels import MATCH, ODOMETRY, POSE, SCENE_OBJECTS, TF
+from toolkit.cli.main import run
+from toolkit.messages.transforms import TFMessage, Transform
+from toolkit.recording.reader import open_recording
+from toolkit.resources import resource as resource_path
+from toolkit.stage import Channel, Stamped
+
+
+def call(*words: object) -> int:
+    """Exit code of the command line."""
+    with pytest.raises(SystemExit) as stop:
+        run([str(word) for word in words])
+    return int(stop.value.code or 0)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two logs of one world, the map of the first, the second localized in it."""
+    here = tmp_path_factory.mktemp("logs")
+    write(here / "a.mcap", messages(seed=1))
+    write(here / "b.mcap", messages(seed=2))
+    assert call("map", here / "a.mcap", "--map", here / "a.db", "-o", here / "mapped.mcap") == 0
+    assert call("localize", here / "b.mcap", "--map", here / "a.db", "-o", here / "b_in_a.mcap") == 0
+    return here
+
+
+def schema_of(verb: str) -> Any:
+    return json.loads(resource_path("schemas", f"json/{verb}.schema.json").read_text())
+
+
+def topics(path: Path) -> dict[str, int]:
+    with open_recording(path) as recording:
+        return {entry.connection.topic: entry.count for entry in recording.channels}
+
+
+def test_map_writes_database_and_log(folder: Path) -> None:
+    before, after = topics(folder / "a.mcap"), topics(folder / "mapped.mcap")
+    assert before.items() <= after.items()
+    assert after["/landmarks/map_pose"] == 120
+    assert after["/landmarks/map_path"] == after["/landmarks/map_markers"] == 1
+
+
+def test_localize_finds_every_bundle(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    after = topics(folder / "b_in_a.mcap")
+    assert after[MATCH.topic] == 120
+    assert after[POSE.topic] == after["/landmarks/pose_cov"] == after[TF.topic] > 100
+    assert after["/landmarks/map"] == 1
+    assert call("evaluate", folder / "b_in_a.mcap", "--align", "--json") == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["false"]["count"] == 0
+    assert document["position"]["rmse_m"] < 0.06
+    assert document["map"]["rmse_aligned_m"] < 0.03
+
+
+def test_json_documents(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("map", folder / "a.mcap", "--map", tmp_path / "a.db", "--json") == 0
+    document = json.loads(capsys.readouterr().out)
+    jsonschema.validate(document, schema_of("map"))
+    assert (document["landmarks"], document["logs"][0]["bundles"]) == (15, 120)
+    assert call("localize", folder / "b.mcap", "--map", tmp_path / "a.db", "-o", tmp_path / "b.mcap", "--json") == 0
+    document = json.loads(capsys.readouterr().out)
+    jsonschema.validate(document, schema_of("localize"))
+    assert document["bundles"] == sum(document["statuses"].values()) == 120
+    assert document["stages"] == {"localize": "ran"}
+
+
+def test_twice_the_same_bytes(folder: Path, tmp_path: Path) -> None:
+    assert call("map", folder / "a.mcap", "--map", tmp_path / "again.db") == 0
+    assert (tmp_path / "again.db").read_bytes() == (folder / "a.db").read_bytes()
+    assert call("localize", folder / "b.mcap", "--map", folder / "a.db", "-o", tmp_path / "again.mcap") == 0
+    assert (tmp_path / "again.mcap").read_bytes() == (folder / "b_in_a.mcap").read_bytes()
+
+
+def test_results_replace_older_results(folder: Path, tmp_path: Path) -> None:
+    assert call("localize", folder / "b_in_a.mcap", "--map", folder / "a.db", "-o", tmp_path / "b.mcap") == 0
+    assert topics(tmp_path / "b.mcap")[MATCH.topic] == 120
+
+
+def test_results_only(folder: Path, tmp_path: Path) -> None:
+    words = ("localize", folder / "b.mcap", "--map", folder / "a.db", "-o", tmp_path / "r.mcap", "--results-only")
+    assert call(*words) == 0
+    found = topics(tmp_path / "r.mcap")
+    assert ODOMETRY.topic not in found
+    assert found[MATCH.topic] == 120
+
+
+def test_many_logs_go_into_a_folder(folder: Path, tmp_path: Path) -> None:
+    logs = (folder / "a.mcap", folder / "b.mcap")
+    assert call("localize", *logs, "--map", folder / "a.db", "-o", tmp_path / "out") == 0
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.mcap", "b.mcap"]
+
+
+def test_a_map_from_the_reference(folder: Path, tmp_path: Path) -> None:
+    assert call("map", folder / "a.mcap", "--from-reference", "--map", tmp_path / "truth.db") == 0
+    assert call("localize", folder / "b.mcap", "--map", tmp_path / "truth.db", "-o", tmp_path / "b.mcap") == 0
+
+
+def test_a_frame_above_odom_is_left_alone(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    transform = Transform.planar(1, ("world", "odom"), (0, 0, 0))
+    log = write(tmp_path / "log.mcap", [Stamped(TF, 1, TFMessage((transform,))), *messages(seed=2)])
+    assert call("localize", log, "--map", folder / "a.db", "-o", tmp_path / "out.mcap") == 0
+    assert topics(tmp_path / "out.mcap")[TF.topic] == 1
+    assert "odom has a parent frame already" in capsys.readouterr().err
+
+
+def refused(capsys: pytest.CaptureFixture[str], code: int, *words: object) -> str:
+    """The one line on stderr of a refusal."""
+    capsys.readouterr()
+    assert call(*words) == code
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1, lines
+    return lines[0]
+
+
+def without(channel: Channel, content: list[Stamped]) -> list[Stamped]:
+    return [stamped for stamped in content if stamped.channel != channel]
+
+
+def test_bad_files(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, database = tmp_path / "out.mcap", folder / "a.db"
+    line = refused(capsys, 1, "localize", tmp_path / "no.mcap", "--map", database, "-o", out)
+    assert "no.mcap: there is no such file" in line
+    text = tmp_path / "text.mcap"
+    text.write_text("not a recording")
+    assert "not an MCAP file" in refused(capsys, 1, "localize", text, "--map", database, "-o", out)
+    assert "No such file" in refused(capsys, 1, "localize", folder / "b.mcap", "--map", tmp_path / "no.db", "-o", out)
+    line = refused(capsys, 2, "localize", folder / "b.mcap", "--map", database, "-o", tmp_path / "no" / "out.mcap")
+    assert "does not exist; create it first" in line
+    line = refused(capsys, 2, "localize", folder / "b.mcap", "--map", database, "-o", folder / "b.mcap")
+    assert "is the input itself" in line
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["text.mcap"]
+
+
+def test_a_map_of_another_version(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    other = tmp_path / "other.db"
+    shutil.copy(folder / "a.db", other)
+    with sqlite3.connect(other) as database:
+        database.execute("PRAGMA user_version = 99")
+    database.close()
+    line = refused(capsys, 1, "localize", folder / "b.mcap", "--map", other, "-o", tmp_path / "out.mcap")
+    assert "other.db" in line
+    assert "99" in line
+    assert not (tmp_path / "out.mcap").exists()
+
+
+def test_missing_and_ambiguous_inputs(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    blind = write(tmp_path / "blind.mcap", without(ODOMETRY, messages()))
+    line = refused(capsys, 1, "map", blind, "--map", tmp_path / "x.db")
+    assert "no odometry" in line
+    assert "--odom" in line
+    empty = write(tmp_path / "empty.mcap", without(SCENE_OBJECTS, messages()))
+    assert "no scene_objects" in refused(capsys, 1, "map", empty, "--map", tmp_path / "x.db")
+    second = Channel("/wheel/odom", ODOMETRY.message)
+    doubled = [Stamped(second, s.log_time_ns, s.message) for s in messages() if s.channel == ODOMETRY]
+    two = write(tmp_path / "two.mcap", [*messages(), *doubled])
+    line = refused(capsys, 2, "map", two, "--map", tmp_path / "x.db")
+    assert "/odom and /wheel/odom" in line
+    assert "--odom TOPIC" in line
+    assert call("map", two, "--map", tmp_path / "x.db", "--odom", "/wheel/odom") == 0
+    assert call("localize", blind, "--map", folder / "a.db", "-o", tmp_path / "out.mcap") == 0
+    assert "without odometry" in capsys.readouterr().err
+
+
+def test_numbers_that_are_not_finite_and_time_that_goes_back(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    content = messages(seed=2)
+    spoilt = []
+    for i, stamped in enumerate(content):
+        message = stamped.message
+        if stamped.channel == SCENE_OBJECTS and i % 5 == 0 and len(message):
+            positions = message.positions_xy.copy()
+            positions[0] = [np.nan, np.inf]
+            message = dataclasses.replace(message, positions_xy=positions)
+        if stamped.channel == ODOMETRY and i % 7 == 0:
+            message = dataclasses.replace(message, stamp_ns=1)
+        spoilt.append(Stamped(stamped.channel, stamped.log_time_ns, message))
+    log = write(tmp_path / "spoilt.mcap", spoilt)
+    assert call("localize", log, "--map", folder / "a.db", "-o", tmp_path / "out.mcap") == 0
+    said = capsys.readouterr().err
+    assert "objects with numbers that are not finite" in said
+    assert "odometry messages whose time goes backwards" in said
+    assert topics(tmp_path / "out.mcap")[POSE.topic] > 90
+
+
+def test_a_cut_log_is_localized_up_to_the_cut(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = (folder / "b.mcap").read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) // 2])
+    assert call("localize", cut, "--map", folder / "a.db", "-o", tmp_path / "out.mcap") == 3
+    assert "cut at byte" in capsys.readouterr().err
+    assert 0 < topics(tmp_path / "out.mcap")[MATCH.topic] < 120
+
+
+def test_a_full_disk_leaves_nothing(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, hard))
+    try:
+        line = refused(capsys, 1, "localize", folder / "b.mcap", "--map", folder / "a.db", "-o", tmp_path / "o.mcap")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert "free space or choose another place" in line
+    assert list(tmp_path.iterdir()) == []
