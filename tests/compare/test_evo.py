@@ -39,7 +39,8 @@ def evos(estimate: Trajectory, reference: Trajectory, *, aligned: bool) -> Figur
     def to_evo(trajectory: Trajectory) -> PoseTrajectory3D:
         quaternion = quaternion_from_yaw(trajectory.poses[:, 2])
         positions = np.column_stack([trajectory.poses[:, :2], np.zeros(len(trajectory))])
-        return PoseTrajectory3D(positions, quaternion[:, [3, 0, 1, 2]], trajectory.time_ns / 1e9)
+        seconds = trajectory.time_ns // 10**9 + (trajectory.time_ns % 10**9) * 1e-9  # as evo reads a header's stamp
+        return PoseTrajectory3D(positions, quaternion[:, [3, 0, 1, 2]], seconds)
 
     ref, est = sync.associate_trajectories(to_evo(reference), to_evo(estimate))
     if aligned:
@@ -81,6 +82,16 @@ def test_nearest_gives_evos_figures(every: int, delay_ns: int, aligned: bool) ->
     mine, theirs = ours(estimate, truth, aligned=aligned), evos(estimate, truth, aligned=aligned)
     assert mine.pairs > 50
     assert mine == pytest.approx(theirs, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_lies_on_the_limit_is_decided_evos_way(seed: int) -> None:
+    """Stamps of whole milliseconds, so that many are 10 ms apart or right between two others."""
+    rng = np.random.default_rng(seed)
+    poses = rng.normal(0, 1, (400, 3))
+    reference = Trajectory.of(EPOCH_NS + np.sort(rng.choice(12_000, 400, replace=False)) * 10**6, poses)
+    estimate = Trajectory.of(EPOCH_NS + np.sort(rng.choice(12_500, 300, replace=False)) * 10**6, poses[:300])
+    assert ours(estimate, reference, aligned=False) == pytest.approx(evos(estimate, reference, aligned=False), abs=1e-6)
 
 
 @pytest.mark.parametrize("aligned", [False, True])

@@ -58,7 +58,8 @@ def interpolated(estimate: Trajectory, reference: Trajectory, max_gap_ns: int) -
 def nearest(estimate: Trajectory, reference: Trajectory, max_difference_ns: int) -> Pairs:
     """Pair each pose of the shorter trajectory with the other's nearest in time, as evo does (1.38).
 
-    Of two equally near ones the earlier is taken; one pose may be the nearest of several.
+    Of two equally near ones the earlier is taken; one pose may be the nearest of several. Times are compared as float
+    seconds, as evo reads them: among stamps since 1970 that decides, by the last 0.2 us, what lies right on the limit.
     """
     if len(estimate) > len(reference):
         asked, found = _nearest(reference.time_ns, estimate.time_ns, max_difference_ns)
@@ -70,8 +71,18 @@ def nearest(estimate: Trajectory, reference: Trajectory, max_difference_ns: int)
 def _nearest(short_ns: Indices, long_ns: Indices, max_difference_ns: int) -> tuple[Indices, Indices]:
     if not len(long_ns):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    later = np.clip(np.searchsorted(long_ns, short_ns), 0, len(long_ns) - 1)
+    short_s, long_s = _seconds(short_ns), _seconds(long_ns)
+    later = np.clip(np.searchsorted(long_s, short_s, side="right"), 0, len(long_s) - 1)
     earlier = np.clip(later - 1, 0, None)
-    best = np.where(np.abs(short_ns - long_ns[earlier]) <= np.abs(long_ns[later] - short_ns), earlier, later)
-    near = np.flatnonzero(np.abs(long_ns[best] - short_ns) <= max_difference_ns)
+    ahead = long_s[later] - short_s
+    behind = np.where(later > 0, short_s - long_s[earlier], np.inf)
+    best, difference = np.where(ahead < behind, later, earlier), np.minimum(ahead, behind)
+    limit_s = max_difference_ns / 1e9
+    inside = (short_s >= long_s[0] - limit_s) & (short_s <= long_s[-1] + limit_s)
+    near = np.flatnonzero(inside & (difference <= limit_s))
     return near, best[near]
+
+
+def _seconds(time_ns: Indices) -> Array:
+    seconds: Array = time_ns // 10**9 + (time_ns % 10**9) * 1e-9
+    return seconds
