@@ -17,6 +17,7 @@ from toolkit.compare.results import results_of
 from toolkit.compare.trajectory import interpolated
 from toolkit.errors import MapError, RecordingError
 from toolkit.landmarks.database import write_map
+from toolkit.messages.match import LandmarkMatch, Status
 from toolkit.messages.poses import Odometry, PoseStamped
 from toolkit.messages.scene import SceneObjects
 from toolkit.recording.writer import create_recording
@@ -60,6 +61,14 @@ def test_a_mapped_log_is_judged_by_its_trajectory(tmp_path: Path) -> None:
     found = evaluated(write(tmp_path / "m.mcap", kept + mapped))
     assert (found["bundles"], found["localized"], found["statuses"], found["nees"]) == (5, 5, None, None)
     assert found["position"]["rmse_m"] == pytest.approx(0.5)
+
+
+def test_a_log_whose_every_match_failed_is_not_judged_by_its_mapping(tmp_path: Path) -> None:
+    kept = [entry for entry in localized_messages() if entry[0] in {TRUTH_POSE, SCENE_OBJECTS}]
+    failed = [(MATCH, time_ns, LandmarkMatch(time_ns, "base", Status.NO_MATCH)) for _, time_ns, _ in kept]
+    mapped = [(MAP_POSE, time_ns, entry) for _, time_ns, entry in kept if isinstance(entry, PoseStamped)]
+    found = evaluated(write(tmp_path / "m.mcap", kept + mapped + failed))
+    assert (found["localized"], found["scored"], found["statuses"]["no_match"]) == (0, 0, 10)
 
 
 def test_zero_stamps_count_by_log_time(tmp_path: Path) -> None:

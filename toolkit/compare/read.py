@@ -111,13 +111,12 @@ class _Collected:
             self.once.setdefault(topic, message)
 
     def outcome(self) -> Outcome:
-        localized = self.poses.get(POSE.topic, [])
-        made = localized or self.poses.get(MAP_POSE.topic, [])
         matches = sum(self.statuses.values())
+        continuous = not matches and POSE.topic not in self.poses
+        made = self.poses.get((MAP_POSE if continuous else POSE).topic, [])
         statuses = {status.name.lower(): self.statuses[status] for status in Status} if matches else None
-        trajectory = _trajectory(made, self.covariances if localized else None)
+        trajectory = _trajectory(made, None if continuous else self.covariances)
         landmarks = self.once.get(MAP.topic)
-        continuous = bool(made) and not localized
         return Outcome(trajectory, matches or self.scenes, self.eligible, statuses, landmarks, self.seen, continuous)
 
     def reference(self) -> Reference:
