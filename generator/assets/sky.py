@@ -62,7 +62,7 @@ def _clouded(rng: np.random.Generator, zenith: Colour, horizon: Colour) -> NDArr
     cover = cv2.remap(layer, x, y, cv2.INTER_LINEAR)
     density = np.clip((cover - rng.uniform(0.35, 0.9)) * 3.5, 0, 1)[..., None] * rng.uniform(0.4, 0.95)
     bright = grey(rng, 0.85, 1.0) * (1 - 0.2 * np.clip(cover - 0.6, 0, 1))[..., None]
-    fade = np.clip(elevation / np.deg2rad(10.0), 0, 1)[:, None, None]
+    fade = np.clip(np.rad2deg(elevation) / 8.0 - 0.75, 0, 1)[:, None, None]
     return np.asarray(image + (bright - image) * density * fade)
 
 

@@ -1,4 +1,4 @@
-"""Chair: four straight legs, a seat, and a back of slats or of one board."""
+"""Chair: four straight legs, a seat, a back of slats or of one board, with or without armrests."""
 
 import numpy as np
 
@@ -21,7 +21,18 @@ def shape(rng: np.random.Generator) -> list[Solid]:
             solids.append(leg.moved(x * LENGTH_M / 2, y * WIDTH_M / 2))
         rail = [(x * LENGTH_M / 2, -WIDTH_M / 2, 0.28), (x * LENGTH_M / 2, WIDTH_M / 2, 0.28)]
         solids.append(limb(rail, 0.013, "frame", 6))
+    if rng.random() < 0.5:
+        solids += _arms(seat)
     return solids + _back(rng, seat, back)
+
+
+def _arms(seat: float) -> list[Solid]:
+    """Armrests on a post in front."""
+    solids = []
+    for y in (0.22, -0.22):
+        solids.append(box(0.42, 0.045, 0.03, "frame").moved(-0.01, y, seat + 0.21))
+        solids.append(limb([(0.17, y, seat), (0.17, y, seat + 0.2)], 0.015, "frame", 6))
+    return solids
 
 
 def _back(rng: np.random.Generator, seat: float, back: float) -> list[Solid]:
@@ -49,14 +60,12 @@ def _back(rng: np.random.Generator, seat: float, back: float) -> list[Solid]:
 
 def paint(rng: np.random.Generator) -> dict[str, Image]:
     """Wood, or a coloured seat on a painted or metal frame."""
-    wood = hsv(rng.uniform(0.05, 0.1), rng.uniform(0.45, 0.7), rng.uniform(0.3, 0.75))
+    wood = hsv(rng.uniform(0.05, 0.1), rng.uniform(0.45, 0.7), rng.uniform(0.3, 0.7))
     if rng.random() < 0.5:
         return {"seat": wooden(rng, wood), "frame": wooden(rng, 0.85 * wood)}
-    colour = pick(rng, (vivid(rng), grey(rng, 0.08, 0.3), grey(rng, 0.7, 0.95)))
-    return {
-        "seat": plain(rng, colour, 64),
-        "frame": plain(rng, pick(rng, (grey(rng, 0.05, 0.25), grey(rng, 0.6, 0.85), 0.8 * wood))),
-    }
+    colour = pick(rng, (vivid(rng, 0.4), grey(rng, 0.06, 0.2), grey(rng, 0.06, 0.2), grey(rng, 0.75, 0.95)))
+    frame = pick(rng, (0.85 * colour, 0.85 * colour, grey(rng, 0.06, 0.2), grey(rng, 0.6, 0.8)))
+    return {"seat": plain(rng, colour, 64), "frame": plain(rng, frame)}
 
 
 CLASS = AssetClass("chair", 56, {"standard": Variant(section.four_legs(LEG_M, LENGTH_M, WIDTH_M), shape, paint)})
