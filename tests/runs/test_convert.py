@@ -179,6 +179,33 @@ def test_ros1_messages_in_mcap_become_ros2(tmp_path: Path) -> None:
     assert stored(target) == {("/scan", START_NS, wanted): 1}
 
 
+def test_a_ros1_definition_that_cannot_be_understood_stops_only_its_topic(tmp_path: Path) -> None:
+    source = tmp_path / "in.mcap"
+    with source.open("wb") as stream:
+        writer = McapWriter(stream)
+        writer.start("ros1")
+        bad = writer.register_schema("odd_msgs/Odd", "ros1msg", b"Missing thing\n")
+        good = writer.register_schema("std_msgs/String", "ros1msg", b"string data\n")
+        writer.add_message(writer.register_channel("/odd", "ros1", bad), 1, b"", 1)
+        writer.add_message(writer.register_channel("/talk", "ros1", good), 1, b"\x02\0\0\0ok", 1)
+        writer.add_message(writer.register_channel("/short", "ros1", good), 1, b"\x09\0\0\0ok", 1)
+        writer.finish()
+    with pytest.raises(RecordingError, match=r"/odd: .*--topics"):
+        run(source, tmp_path / "out.mcap")
+    done = one(source, tmp_path / "out.mcap", Selection(("/talk", "/short")))
+    assert done.topics == {"/talk": 1, "/short": 0}
+    assert (done.declared, done.lost) == (2, 1)
+    assert "in.mcap: /short: 6 bytes are not a std_msgs/String" in done.losses[0]
+
+
+@pytest.mark.parametrize("mode", ["message", "file"])
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_compression_is_taken_off(storage: str, mode: str, tmp_path: Path) -> None:
+    one(write_ros2(tmp_path / "plain", storage=storage), tmp_path / "plain.mcap")
+    one(write_ros2(tmp_path / "packed", storage=storage, mode=mode), tmp_path / "packed.mcap")
+    assert stored(tmp_path / "packed.mcap") == stored(tmp_path / "plain.mcap")
+
+
 def test_parts_of_a_split_bag_become_one(tmp_path: Path, shared_data: Path) -> None:
     folder = shared_data / "bags" / "rosbag2_split_sqlite3"
     parts = sorted(folder.glob("*.db3"))

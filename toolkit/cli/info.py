@@ -31,7 +31,7 @@ def command(
             _print(log, several=sum(other.path == log.path for other in logs) > 1)
     for log in logs:
         for loss in log.losses:
-            warn(f"warning: {log.path}: {loss}")
+            warn(f"warning: {loss}")
     if any(log.losses for log in logs):
         raise typer.Exit(PARTIAL)
 

@@ -63,7 +63,8 @@ def describe(path: Path, settings: Settings) -> list[LogInfo]:
         for log in logs:
             if path.is_file() and len(log.parts) == 1 and isinstance(log.parts[0], McapLog):
                 with open_recording(path) as recording:  # also the channels that cannot be converted
-                    described.append(_describe(log, recording.profile, [recording], recording.losses))
+                    losses = [f"{path.name}: {loss}" for loss in recording.losses]
+                    described.append(_describe(log, recording.profile, [recording], losses))
             else:
                 losses = [*log.losses, *(loss for part in log.parts for loss in part.losses)]
                 described.append(_describe(log, _profile(log), log.parts, losses))

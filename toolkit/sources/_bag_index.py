@@ -63,6 +63,8 @@ def _from_end(stream: BinaryIO, size: int, position: int, expected: tuple[int, .
             index.chunks.append(container.parse_chunk_info(header, data))
     if (len(index.connections), len(index.chunks)) != expected:
         raise DamagedBagError(f"it lists {len(index.chunks)} of {expected[1]} chunks")
+    if any(chunk.offset >= position for chunk in index.chunks):
+        raise DamagedBagError("it names places behind the chunks")
     if not set(index.counts()) <= set(index.connections):
         raise DamagedBagError("it counts messages of connections that it does not list")
     return index

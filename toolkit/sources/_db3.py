@@ -60,7 +60,7 @@ class Db3Log:
         try:
             with _database(path) as database:
                 self._read_topics(database, distribution)
-        except sqlite3.DatabaseError as error:
+        except (sqlite3.DatabaseError, UnicodeDecodeError, KeyError, TypeError) as error:
             raise RecordingError(f"{path} is no ROS 2 bag, or too damaged to read: {error}; copy it again") from error
 
     def _read_topics(self, database: sqlite3.Connection, distribution: str | None) -> None:
@@ -79,7 +79,7 @@ class Db3Log:
         ]
         orphans = sum(count for key, count in counts.items() if key not in self._topics)
         if orphans:
-            self.losses.append(f"{self._path.name}: {orphans} messages belong to topics that are nowhere described")
+            self._lose(f"{orphans} messages belong to topics that are nowhere described")
 
     def _count(self, database: sqlite3.Connection) -> Counter[int]:
         counts: Counter[int] = Counter()
@@ -87,8 +87,9 @@ class Db3Log:
         self.end_ns: int | None = None
         try:
             counts.update(dict(database.execute("SELECT topic_id, count(*) FROM messages GROUP BY topic_id")))
-            self.start_ns = database.execute("SELECT min(timestamp) FROM messages").fetchone()[0]
-            self.end_ns = database.execute("SELECT max(timestamp) FROM messages").fetchone()[0]
+            if counts:
+                self.start_ns = _number(database.execute("SELECT min(timestamp) FROM messages").fetchone()[0])
+                self.end_ns = _number(database.execute("SELECT max(timestamp) FROM messages").fetchone()[0])
         except sqlite3.DatabaseError as error:
             self._damaged(error)
             counts.clear()
@@ -100,9 +101,12 @@ class Db3Log:
         return counts
 
     def _damaged(self, error: sqlite3.DatabaseError) -> None:
-        loss = f"{self._path.name} is cut or damaged ({error}); what lies before the damage was taken"
-        if loss not in self.losses:
-            self.losses.append(loss)
+        self._lose(f"it is cut or damaged ({error}); what lies before the damage was taken")
+
+    def _lose(self, text: str) -> None:
+        text = f"{self._path.name}: {text}"
+        if text not in self.losses:
+            self.losses.append(text)
 
     def messages(
         self,
@@ -127,6 +131,9 @@ class Db3Log:
         for time_ns, _, key, data in self._ordered(
             _FIRST if start_ns is None else start_ns, _LAST if end_ns is None else end_ns
         ):
+            if not isinstance(data, bytes) or _number(time_ns) != time_ns:
+                self._lose("rows without a sound time and payload are left out")
+                continue
             read += len(data)
             if progress and read >= _REPORT_BYTES:
                 progress(read)
@@ -143,9 +150,7 @@ class Db3Log:
         try:
             payload = unpacked(data)
         except MessageError as error:
-            loss = f"{self._path.name}: {connection.topic}: {error}; such messages are left out"
-            if loss not in self.losses:
-                self.losses.append(loss)
+            self._lose(f"{connection.topic}: {error}; such messages are left out")
             return None
         if topic.distribution:
             try:
@@ -183,6 +188,11 @@ def _database(path: Path) -> Iterator[sqlite3.Connection]:
         except sqlite3.DatabaseError:
             database.execute("PRAGMA writable_schema=ON")  # SQLite then reads a file that is shorter than it says
         yield database
+
+
+def _number(value: object) -> int:
+    """A time as recordings can hold it, zero for anything else that a damaged row may have there."""
+    return value if isinstance(value, int) and value >= 0 else 0
 
 
 def _rows(database: sqlite3.Connection, query: str) -> list[sqlite3.Row]:
@@ -250,8 +260,9 @@ def _by_time(database: sqlite3.Connection, first_ns: int, end_ns: int) -> Iterat
 def _fetched(database: sqlite3.Connection, keys: Iterator[_Key]) -> Iterator[_Row]:
     """Rows one by one: sorting them whole would take their payloads along."""
     for time_ns, row in keys:
-        topic, data = database.execute("SELECT topic_id, data FROM messages WHERE rowid = ?", (row,)).fetchone()
-        yield time_ns, row, topic, data
+        found = database.execute("SELECT topic_id, data FROM messages WHERE rowid = ?", (row,)).fetchone()
+        if found is not None:  # an index may name rows that are gone
+            yield time_ns, row, found[0], found[1]
 
 
 def _by_row(database: sqlite3.Connection) -> Iterator[tuple[int, int, int]]:

@@ -115,13 +115,16 @@ class BagLog:
             found, _, problem = read_chunk(stream, self._size, chunk.offset)
             if progress:
                 progress(stream.tell() - chunk.offset)
-        declared = sum(chunk.counts.values())
-        if problem or len(found) < declared:
+        missing = sum(chunk.counts.values()) - len(found)
+        where = f"the chunk at byte {chunk.offset}"
+        if missing > 0:
             why = f" ({problem})" if problem else ""
-            self._lose(f"the chunk at byte {chunk.offset}{why} lacks {declared - len(found)} of {declared} messages")
+            self._lose(f"{where}{why} lacks {missing} of {sum(chunk.counts.values())} messages")
+        elif problem:
+            self._lose(f"{where} is damaged ({problem}); the {len(found)} messages before that were taken")
         orphans = sum(message.connection_id not in self._connections for message in found)
         if orphans:
-            self._lose(f"{orphans} messages of the chunk at byte {chunk.offset} belong to no connection")
+            self._lose(f"{orphans} messages of {where} belong to no connection")
         return found
 
     def _conversion(self, connection: Connection) -> Convert:
