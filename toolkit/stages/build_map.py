@@ -20,12 +20,13 @@ from toolkit.stages._build_map_thesis import solve_as_in_the_thesis
 class BuildMapConfig:
     """How a map is built.
 
-    `range_sigma_m` and `bearing_sigma_rad` stand in for covariances that the log leaves unknown. The odometry noise is
-    a first guess, per square root of a metre or radian; the log itself tells the rest. `slack` widens the observations'
-    sigmas while they are labelled. `robust_dof`: degrees of the Student-t distribution of the joint solution.
-    A landmark with fewer good sightings than `min_sightings` is tentative, and so is one that stands where another does
-    and was seen less than `misread_share` times as often: it is that one under a wrong class. Logs join if their
-    landmarks agree within `join_tolerance_m`.
+    `range_sigma_m` and `bearing_sigma_rad` stand in for covariances that the log leaves unknown. Odometry noise per
+    square root of a metre (`odometry_position_m`, `odometry_heading_rad`) or of a radian (`odometry_turning_rad`) is a
+    first guess; the log itself tells the rest. `slack` widens the observations' sigmas while they are labelled.
+    `robust_dof`: degrees of the Student-t distribution of the joint solution. A landmark with fewer fitting sightings
+    than `min_sightings` is tentative, and so is one that stands where another does and was seen less than
+    `misread_share` times as often: it is that one under a wrong class. Logs join if their landmarks agree within
+    `join_tolerance_m`.
     """
 
     method: Literal["default", "thesis"] = "default"
