@@ -3,7 +3,7 @@
 import hashlib
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -53,14 +53,19 @@ def carried_fingerprint(metadata: Mapping[str, Mapping[str, str]]) -> str | None
     return str(json.loads(text)) if text else None
 
 
-def file_hash(path: Path) -> str:
-    """SHA-256 of a file's content.
+def file_hash(path: Path, progress: Callable[[int], None] | None = None) -> str:
+    """SHA-256 of a file's content; `progress` is told the bytes that were read.
 
     Raises:
         ToolkitError: the file cannot be read.
     """
+    digest = hashlib.sha256()
     try:
         with path.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
+            while block := stream.read(1 << 20):
+                digest.update(block)
+                if progress:
+                    progress(len(block))
     except OSError as error:
         raise ToolkitError(f"{path}: cannot be read ({error.strerror}); check the path") from error
+    return digest.hexdigest()

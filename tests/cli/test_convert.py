@@ -124,7 +124,7 @@ def test_bad_input_is_refused_in_one_line(tmp_path: Path, capsys: pytest.Capture
         (UNUSABLE, "is not an MCAP file", (tmp_path / "words.mcap", "-o", target)),
         (UNUSABLE, "is empty (0 bytes); record or copy", (tmp_path / "empty.bag", "-o", target)),
         (USAGE, "does not exist; create it first", (source, "-o", tmp_path / "none" / "a.mcap")),
-        (USAGE, "is the input itself", (source, "-o", source)),
+        (USAGE, "is part of the input", (source, "-o", source)),
         (USAGE, "--start yesterday: give RFC 3339", (source, "--start", "yesterday", "-o", target)),
         (USAGE, "matches none of /scan, /talk", (source, "--topics", "scan", "-o", target)),
     ]

@@ -325,9 +325,14 @@ def test_the_input_is_never_the_output(tmp_path: Path) -> None:
     source = tmp_path / "a.mcap"
     one(write_ros1(tmp_path / "a.bag"), source)
     before = source.read_bytes()
-    with pytest.raises(UsageError, match="is the input itself"):
+    with pytest.raises(UsageError, match="is part of the input"):
         run(source, source)
     assert source.read_bytes() == before
+    folder = write_ros2(tmp_path / "bag", storage="mcap")
+    with pytest.raises(UsageError, match="is part of the input"):
+        run(folder, folder / "bag.mcap")
+    with pytest.raises(UsageError, match="is given 2 times"):
+        run([source, source], tmp_path / "out.mcap")
 
 
 def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:

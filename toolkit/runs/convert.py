@@ -70,13 +70,17 @@ def convert(paths: Sequence[Path], output: Path, selection: Selection, settings:
     """
     patterns = _patterns(selection.topics)
     conversion = Conversion()
+    for path, count in Counter(paths).items():
+        if count > 1:
+            raise UsageError(f"{path} is given {count} times; name each input once")
     with contextlib.ExitStack() as stack:
         logs = [log for path in paths for log in stack.enter_context(open_logs(path, settings))]
         stack.enter_context(_no_empty_folder(output))
-        hashes = {path: _content_hash(path) for path in paths}
-        for target, group in _plan(logs, output).items():
-            job = _Job(target, group, selection, patterns)
+        plan = _plan(logs, output)
+        hashes = {path: _content_hash(path, watch) for path in paths}
+        for target, group in plan.items():
             try:
+                job = _Job(target, group, selection, patterns)
                 with watch(f"convert to {target.name}", sum(log.size_bytes for log in group)) as advance:
                     conversion.outputs.append(job.run(hashes, advance))
             except ToolkitError as error:
@@ -114,11 +118,11 @@ def _plan(logs: Sequence[OpenLog], output: Path) -> dict[Path, list[OpenLog]]:
     elif output.suffix == ".mcap":
         plan = {next(iter(output_files([output], output).values())): list(logs)}
     else:
-        files = output_files([Path(log.name).with_suffix(".mcap") for log in logs], output)
+        files = output_files([Path(f"{log.name}.mcap") for log in logs], output)
         plan = {target: [log] for target, log in zip(files.values(), logs, strict=True)}
-    for target, group in plan.items():
-        if any(target.resolve() == log.path.resolve() for log in group):
-            raise UsageError(f"{target} is the input itself; write to another file")
+    for target in plan:
+        if target.exists() and any(target.resolve().is_relative_to(log.path.resolve()) for log in logs):
+            raise UsageError(f"{target} is part of the input; write to another file")
     return plan
 
 
@@ -250,10 +254,12 @@ def _identity(connection: Connection) -> tuple[object, ...]:
     return connection.topic, connection.message_type, encodings, definition, quality
 
 
-def _content_hash(path: Path) -> str:
+def _content_hash(path: Path, watch: Watch) -> str:
     """SHA-256 of a file, or of the names and hashes of a folder's files."""
+    files = [path] if path.is_file() else sorted(file for file in path.rglob("*") if file.is_file())
+    with watch(f"hash {path.name}", sum(file.stat().st_size for file in files)) as advance:
+        hashes = [file_hash(file, advance) for file in files]
     if path.is_file():
-        return file_hash(path)
-    files = sorted(file for file in path.rglob("*") if file.is_file())
-    lines = [f"{file.relative_to(path).as_posix()} {file_hash(file)}\n" for file in files]
+        return hashes[0]
+    lines = [f"{file.relative_to(path).as_posix()} {hash_}\n" for file, hash_ in zip(files, hashes, strict=True)]
     return hashlib.sha256("".join(lines).encode()).hexdigest()

@@ -120,17 +120,10 @@ class Db3Log:
         Raises:
             RecordingError: a wanted topic has no definition, or messages that do not fit the one of the distribution.
         """
-        wanted = {
-            key: topic for key, topic in self._topics.items() if connections is None or topic.connection in connections
-        }
-        counted = {summary.connection for summary in self.channels}
-        for topic in wanted.values():
-            if topic.problem and topic.connection in counted:
-                raise RecordingError(f"{self._path}: {topic.problem}")
+        wanted = self._wanted(connections)
+        first, end = _FIRST if start_ns is None else start_ns, _LAST if end_ns is None else end_ns
         read = 0
-        for time_ns, _, key, data in self._ordered(
-            _FIRST if start_ns is None else start_ns, _LAST if end_ns is None else end_ns
-        ):
+        for time_ns, _, key, data in self._ordered(first, end):
             if not isinstance(data, bytes) or _number(time_ns) != time_ns:
                 self._lose("rows without a sound time and payload are left out")
                 continue
@@ -144,6 +137,16 @@ class Db3Log:
                     yield RawMessage(wanted[key].connection, time_ns, time_ns, 0, payload)
         if progress:
             progress(read)
+
+    def _wanted(self, connections: Collection[Connection] | None) -> dict[int, _Topic]:
+        wanted = {
+            key: topic for key, topic in self._topics.items() if connections is None or topic.connection in connections
+        }
+        counted = {summary.connection for summary in self.channels}
+        for topic in wanted.values():
+            if topic.problem and topic.connection in counted:
+                raise RecordingError(f"{self._path}: {topic.problem}")
+        return wanted
 
     def _payload(self, topic: _Topic, data: bytes) -> bytes | memoryview | None:
         connection = topic.connection
