@@ -195,3 +195,21 @@ def test_a_declared_channel_needs_no_message(tmp_path: Path) -> None:
     with open_recording(path) as recording:
         assert [(c.connection.topic, c.count) for c in recording.channels] == [(SCENE_OBJECTS.topic, 0)]
         assert recording.start_ns is None
+
+
+def test_a_cut_chunk_gives_its_first_messages(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    write_log(path)
+    with open_recording(path) as recording:
+        whole = [(m.connection.topic, m.log_time_ns, bytes(m.data)) for m in recording.messages()]
+    data = path.read_bytes()
+    counts = []
+    for size in range(len(data) // 4, len(data), len(data) // 23):
+        path.write_bytes(data[:size])
+        with open_recording(path) as recording:
+            found = [(m.connection.topic, m.log_time_ns, bytes(m.data)) for m in recording.messages()]
+            assert len([loss for loss in recording.losses if "cut at byte" in loss]) == 1
+        assert set(found) <= set(whole)
+        counts.append(len(found))
+    assert counts == sorted(counts)
+    assert len(set(counts)) > 10  # a cut costs messages, not whole chunks

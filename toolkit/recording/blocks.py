@@ -2,6 +2,7 @@
 
 import zlib
 from collections.abc import Callable, Iterator, Mapping
+from struct import error as struct_error
 from typing import BinaryIO
 
 import lz4.frame
@@ -22,16 +23,8 @@ def chunk_content(record: bytes, *, verify: bool) -> memoryview:
     Raises:
         DamagedBlockError: it cannot be decompressed, has another size than declared, or a wrong CRC.
     """
-    try:
-        _, _, size, crc = CHUNK.unpack_from(record)
-        name_length = int.from_bytes(record[28:32], "little")
-        compression = bytes(record[32 : 32 + name_length]).decode()
-        start = 32 + name_length + 8
-        length = int.from_bytes(record[start - 8 : start], "little")
-    except (ValueError, IndexError) as error:
-        raise DamagedBlockError("its header is damaged") from error
-    data = memoryview(record)[start : start + length]
-    if size > LARGEST_CHUNK or len(data) != length:
+    size, crc, compression, data, length = _header(record)
+    if len(data) != length:
         raise DamagedBlockError(f"it claims {size} bytes from {length}")
     content = _decompress(compression, data, size)
     if len(content) != size:
@@ -39,6 +32,45 @@ def chunk_content(record: bytes, *, verify: bool) -> memoryview:
     if verify and crc and zlib.crc32(content) != crc:
         raise DamagedBlockError("its CRC does not match")
     return content
+
+
+def cut_chunk_content(record: bytes) -> memoryview:
+    """What can be had of a chunk that the end of the file cuts: its first whole records. Their CRC is unknown.
+
+    Raises:
+        DamagedBlockError: not even its header is there, or the bytes are not what it says.
+    """
+    _, _, compression, data, _ = _header(record)
+    content = data
+    try:
+        if compression == "zstd":
+            content = memoryview(zstandard.ZstdDecompressor().decompressobj().decompress(data))
+        elif compression == "lz4":
+            content = memoryview(lz4.frame.LZ4FrameDecompressor().decompress(data))
+    except (zstandard.ZstdError, RuntimeError, EOFError) as error:
+        raise DamagedBlockError(f"{compression} cannot decompress it") from error
+    position = 0
+    while position + RECORD.size <= len(content):
+        end = position + RECORD.size + RECORD.unpack_from(content, position)[1]
+        if end > len(content):
+            break
+        position = end
+    return content[:position]
+
+
+def _header(record: bytes) -> tuple[int, int, str, memoryview, int]:
+    """Uncompressed size, CRC, compression, the data that is there, and how long it should be."""
+    try:
+        _, _, size, crc = CHUNK.unpack_from(record)
+        name_length = int.from_bytes(record[28:32], "little")
+        compression = bytes(record[32 : 32 + name_length]).decode()
+    except (struct_error, ValueError) as error:
+        raise DamagedBlockError("its header is damaged") from error
+    if size > LARGEST_CHUNK:
+        raise DamagedBlockError(f"it claims {size} bytes")
+    start = 32 + name_length + 8
+    length = int.from_bytes(record[start - 8 : start], "little")
+    return size, crc, compression, memoryview(record)[start : start + length], length
 
 
 def _decompress(compression: str, data: memoryview, size: int) -> memoryview:
@@ -90,7 +122,8 @@ def block_messages(
     if block.is_chunk:
         if raw[0] != Opcode.CHUNK:
             raise DamagedBlockError("there is no chunk where the summary says")
-        content = chunk_content(raw[RECORD.size :], verify=verify)
+        record = raw[RECORD.size :]
+        content = cut_chunk_content(record) if block.is_cut else chunk_content(record, verify=verify)
     else:
         content = memoryview(raw)
     found: list[RawMessage] = []

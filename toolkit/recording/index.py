@@ -14,13 +14,14 @@ from toolkit.recording.container import FOOTER_SIZE, MAGIC, RECORD, Opcode, pars
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A stretch of the file with messages: one chunk record, or a run of messages outside chunks."""
+    """A stretch of the file with messages: one chunk record, whole or cut by the end of the file, or loose messages."""
 
     offset: int
     length: int
     start_ns: int
     end_ns: int
     is_chunk: bool = True
+    is_cut: bool = False
 
 
 @dataclass(slots=True)

@@ -6,7 +6,7 @@ from typing import BinaryIO
 from mcap import records
 from mcap.exceptions import McapError
 
-from toolkit.recording.blocks import DamagedBlockError, chunk_content, records_in
+from toolkit.recording.blocks import DamagedBlockError, chunk_content, cut_chunk_content, records_in
 from toolkit.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, parse
 from toolkit.recording.index import Block, Index
 
@@ -45,6 +45,8 @@ class _Scanner:
             head = self._stream.read(RECORD.size)
             length = RECORD.unpack(head)[1] if len(head) == RECORD.size else self._size
             if offset + RECORD.size + length > self._size:
+                if head[:1] == bytes([Opcode.CHUNK]):
+                    self._chunk(offset, self._stream.read(self._size - offset - RECORD.size), is_cut=True)
                 break
             self._take(head[0], offset, length)
             finished = head[0] == Opcode.FOOTER
@@ -92,9 +94,9 @@ class _Scanner:
             self.index.blocks.append(self._run.block())
             self._run = None
 
-    def _chunk(self, offset: int, record: bytes) -> None:
+    def _chunk(self, offset: int, record: bytes, *, is_cut: bool = False) -> None:
         try:
-            content = chunk_content(record, verify=True)
+            content = cut_chunk_content(record) if is_cut else chunk_content(record, verify=True)
             found = list(records_in(content))
         except DamagedBlockError as error:
             self.index.losses.append(f"the chunk at byte {offset} is damaged ({error}); its messages are left out")
@@ -108,7 +110,7 @@ class _Scanner:
                 has_messages = True
         if has_messages:
             first, last, _, _ = CHUNK.unpack_from(record)
-            self.index.blocks.append(Block(offset, RECORD.size + len(record), first, last))
+            self.index.blocks.append(Block(offset, RECORD.size + len(record), first, last, is_cut=is_cut))
 
     def _define(self, opcode: int, content: bytes | memoryview) -> None:
         try:
