@@ -11,7 +11,7 @@ from generator.history import History, rotate
 from generator.odometry import true_poses
 from generator.randomness import Stream, draws
 from generator.robot import BASE_FROM_OPTICAL, CAMERA_IN_BASE_M, OPTICAL_FRAME
-from generator.scenario import CameraSpec
+from generator.sensor_specs import CameraSpec
 from toolkit.geometry.angles import wrap
 from toolkit.messages.images import CameraInfo
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from generator.scenario import SensorSpec
+from generator.sensor_specs import SensorSpec
 
 _MOST_JITTER = 0.4
 """In periods: measurements must not overtake each other."""

@@ -7,7 +7,7 @@ import numpy as np
 from generator.clock import regular_times
 from generator.history import History
 from generator.layout import PlacedObject
-from generator.scenario import TruthSpec
+from generator.sensor_specs import TruthSpec
 from toolkit.channels import MAP_FRAME, TRUTH_OBJECTS, TRUTH_POSE
 from toolkit.messages.poses import PoseStamped
 from toolkit.messages.scene import SceneObjects

@@ -9,7 +9,7 @@ from generator.clock import measurement_times, to_ns
 from generator.history import History, rotate
 from generator.randomness import Stream, draws
 from generator.robot import SCAN_FRAME, SCAN_IN_BASE_M
-from generator.scenario import LidarSpec
+from generator.sensor_specs import LidarSpec
 from generator.world import World
 from toolkit.channels import SCAN
 from toolkit.messages.scan import LaserScan

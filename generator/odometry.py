@@ -9,7 +9,7 @@ from generator.clock import measurement_times, to_ns
 from generator.history import History
 from generator.randomness import Stream, draws
 from generator.robot import WHEEL_DISTANCE_M, WHEEL_RADIUS_M
-from generator.scenario import OdometrySpec
+from generator.sensor_specs import OdometrySpec
 from toolkit.channels import BASE_FRAME, ODOM_FRAME, ODOMETRY, TF
 from toolkit.geometry import se2
 from toolkit.geometry.angles import yaw_from_quaternion

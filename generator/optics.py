@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from generator.randomness import Stream, draws
-from generator.scenario import CameraSpec
+from generator.sensor_specs import CameraSpec
 
 Image = NDArray[np.uint8]
 

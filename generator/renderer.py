@@ -1,39 +1,32 @@
-"""Renders what the camera sees: objects by PyBullet's software renderer, ground and sky by ourselves; with masks."""
+"""Renders what the camera sees: which objects are in view, in front of ground and sky, with their masks."""
 
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Self
 
 import cv2
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from generator.assets import ground, sky
 from generator.assets.backdrop import Backdrop, Shadow, cast_shadow
-from generator.assets.bullet import AssetStore, Body
+from generator.assets.bullet import Body
 from generator.camera import Intrinsics, View
+from generator.drawing import NEAR_M, Drawing, Image, Window
 from generator.layout import PlacedObject
 from generator.scenario import Scenario
 
 Floats = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 FAR_M = 30.0
 """Objects beyond this distance are not drawn."""
-NEAR_M = 0.05
+SHADOWS_TO_M = 12.0
+"""So far away the ground shows a shadow as a line of a pixel or two."""
 SUPERSAMPLING = 2
 """Objects are rendered this many times finer than the image, for smooth edges."""
-
-
-@dataclass(frozen=True, slots=True)
-class Window:
-    """A part of the image plane in pixels of the image, which may lie partly outside of it."""
-
-    left: int
-    top: int
-    right: int
-    bottom: int
+# Silhouettes of larger windows are rendered coarser.
+_SILHOUETTE_AREA_PX = 60_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +36,6 @@ class Visible:
     placed: PlacedObject
     bodies: tuple[Body, ...]
     window: Window
-    distance_m: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,33 +52,29 @@ class Renderer:
     """Draws one scenario's world from any place; a context manager that disconnects from PyBullet."""
 
     def __init__(self, scenario: Scenario, objects: Sequence[PlacedObject]) -> None:
-        self._client: int = pybullet.connect(pybullet.DIRECT)
-        self._store = AssetStore(self._client)
+        self._intrinsics = Intrinsics.of(scenario.camera)
+        self._light = scenario.light
+        self._stack = ExitStack()
+        self._world = self._stack.enter_context(Drawing(self._intrinsics, self._light))
+        self._alone = self._stack.enter_context(Drawing(self._intrinsics, self._light))
         self._objects = objects
         self._centres = np.array([placed.route_xy[0] for placed in objects]).reshape(-1, 2)
-        self._intrinsics = Intrinsics.of(scenario.camera)
+        self._moving = np.array([placed.moves for placed in objects], dtype=bool)
+        self._reach_m = np.array([placed.asset.footprint_radius_m for placed in objects])
+        self._corners = [_corners(placed) for placed in objects]
         self._rays = self._intrinsics.rays()
-        light = scenario.light
-        azimuth, elevation = np.deg2rad(light.azimuth_deg), np.deg2rad(light.elevation_deg)
-        self._towards_light = np.array(
-            [np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)]
-        )
-        self._light = light
         self._backdrop = Backdrop(
             sky.panorama(scenario.background.kind, scenario.background.look),
             ground.texture(scenario.ground.kind, scenario.ground.look),
             scenario.ground.tile_m,
         )
         self._shadows: dict[str, Shadow] = {}
-        self._drawn: tuple[str, ...] = ()
-        self._bodies: dict[str, tuple[Body, ...]] = {}
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        pybullet.disconnect(physicsClientId=self._client)
-        self._store.__exit__(None, None, None)
+        self._stack.close()
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -100,49 +88,43 @@ class Renderer:
             view.eye_m,
             self._rays @ view.world_from_optical.T.astype(np.float32),
             1 / self._intrinsics.focal_px,
-            [self._shadow(placed, view.time_s) for placed, _ in in_view],
+            self._shadows_in(view, [placed for placed, _ in in_view]),
             self._light.shade,
         )
-        visible = self._placed_bodies(view, in_view)
+        bodies = self._world.show([placed for placed, _ in in_view], view.time_s)
+        visible = tuple(Visible(placed, body, window) for (placed, window), body in zip(in_view, bodies, strict=True))
         window = self._inner_window([one.window for one in visible])
         if window is None:
             return Rendered(image, np.full((0, 0), -1, np.int32), None, visible)
-        colours, body_ids = self._render(view, window, SUPERSAMPLING)
+        colours, body_ids = self._world.render(view, window, SUPERSAMPLING)
         _lay_over(image, window, colours, body_ids >= 0)
         return Rendered(image, body_ids, window, visible)
 
-    def silhouette_px(self, view: View, one: Visible, side_px: int = 160) -> float:
-        """Area in pixels of the image of an object's labelled parts, were none hidden by objects or the image's edge."""
-        width, height = one.window.right - one.window.left, one.window.bottom - one.window.top
-        scale = min(float(SUPERSAMPLING), side_px / max(width, height))
-        others = [body for name, bodies in self._bodies.items() if name != one.placed.object_id for body in bodies]
-        hidden = others + [body for body in one.bodies if not body.labelled]
-        places = [pybullet.getBasePositionAndOrientation(body.body_id, physicsClientId=self._client) for body in hidden]
-        for body in hidden:
-            self._move(body, (0.0, 0.0, -1000.0), (0.0, 0.0, 0.0, 1.0))
-        _, body_ids = self._render(view, one.window, scale)
-        for body, (position, orientation) in zip(hidden, places, strict=True):
-            self._move(body, position, orientation)
-        return float((body_ids >= 0).mean()) * width * height
+    def silhouette_px(self, view: View, one: Visible) -> float:
+        """Area in pixels of the image of an object's labelled parts, were none hidden by an object or the edge."""
+        area_px = one.window.width * one.window.height
+        scale = SUPERSAMPLING * min(1.0, float(np.sqrt(_SILHOUETTE_AREA_PX / area_px)))
+        (bodies,) = self._alone.show([one.placed], view.time_s)
+        _, body_ids = self._alone.render(view, one.window, scale)
+        labelled = np.isin(body_ids, [body.body_id for body in bodies if body.labelled])
+        return float(labelled.mean()) * area_px
 
     def _in_view(self, view: View) -> list[tuple[PlacedObject, Window]]:
         """Objects within reach whose bounding box meets the image, with the window that holds the box."""
+        away = self._centres - view.eye_m[:2]
+        ahead = away @ view.world_from_optical[:2, 2] > -self._reach_m
+        near = np.hypot(away[:, 0], away[:, 1]) < FAR_M + self._reach_m
         found = []
-        for i, placed in enumerate(self._objects):
-            pose = placed.pose_at(view.time_s) if placed.moves else np.array([*self._centres[i], placed.yaw_rad])
-            away = pose[:2] - view.eye_m[:2]
-            reach = placed.asset.footprint_radius_m
-            if away @ away > (FAR_M + reach) ** 2 or view.world_from_optical[:2, 2] @ away < -reach:
-                continue
-            window = self._window(view, placed, pose)
-            if window is not None:
+        for i in np.flatnonzero((ahead & near) | self._moving).tolist():
+            placed = self._objects[i]
+            pose = placed.pose_at(view.time_s)
+            window = self._window(view, self._corners[i], pose)
+            if window is not None and np.hypot(*(pose[:2] - view.eye_m[:2])) < FAR_M:
                 found.append((placed, window))
         return found
 
-    def _window(self, view: View, placed: PlacedObject, pose: Floats) -> Window | None:
-        """The window around an object's bounding box; None if it lies outside the image."""
-        low, high = placed.asset.bounds_m
-        corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    def _window(self, view: View, corners: Floats, pose: Floats) -> Window | None:
+        """The window around an object's bounding box (8, 3) at a pose; None if it lies outside the image."""
         c, s = np.cos(pose[2]), np.sin(pose[2])
         world = corners @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + [pose[0], pose[1], 0.0]
         local = (world - view.eye_m) @ view.world_from_optical
@@ -151,90 +133,46 @@ class Renderer:
         # Corners beside or behind the camera are drawn to its front: their direction sideways stays.
         local[:, 2] = np.maximum(local[:, 2], NEAR_M)
         pixels = self._intrinsics.project(local)
-        width, height = self._intrinsics.width_px, self._intrinsics.height_px
+        width, height = self.size_px
         (left, top), (right, bottom) = np.floor(pixels.min(axis=0)), np.ceil(pixels.max(axis=0)) + 1
-        if right <= 0 or left >= width or bottom <= 0 or top >= height:
-            return None
         # An object beside the camera would need a window without end.
-        left, right = max(left, -width), min(right, 2 * width)
-        top, bottom = max(top, -height), min(bottom, 2 * height)
-        return Window(int(left), int(top), int(right), int(bottom))
-
-    def _placed_bodies(self, view: View, in_view: list[tuple[PlacedObject, Window]]) -> tuple[Visible, ...]:
-        """Have exactly the objects in view in the renderer, always in the same order: nothing else shapes a picture."""
-        names = tuple(placed.object_id for placed, _ in in_view)
-        if names != self._drawn:
-            for bodies in self._bodies.values():
-                for body in bodies:
-                    pybullet.removeBody(body.body_id, physicsClientId=self._client)
-            self._bodies = {placed.object_id: self._store.spawn(placed.asset) for placed, _ in in_view}
-            self._drawn = names
-        visible = []
-        for placed, window in in_view:
-            x, y, heading = placed.pose_at(view.time_s)
-            turn = pybullet.getQuaternionFromEuler([0.0, 0.0, heading])
-            bodies = self._bodies[placed.object_id]
-            for body in bodies:
-                self._move(body, (x, y, 0.0), turn)
-            distance = float(np.hypot(*(view.eye_m[:2] - (x, y))))
-            visible.append(Visible(placed, bodies, window, distance))
-        return tuple(visible)
-
-    def _move(self, body: Body, position: Sequence[float], orientation: Sequence[float]) -> None:
-        pybullet.resetBasePositionAndOrientation(body.body_id, position, orientation, physicsClientId=self._client)
+        window = Window(
+            int(max(left, -width)), int(max(top, -height)), int(min(right, 2 * width)), int(min(bottom, 2 * height))
+        )
+        return window if window.meets(Window(0, 0, width, height)) else None
 
     def _inner_window(self, windows: list[Window]) -> Window | None:
         """The part of the image that holds all windows."""
         if not windows:
             return None
+        width, height = self.size_px
         return Window(
             max(0, min(window.left for window in windows)),
             max(0, min(window.top for window in windows)),
-            min(self._intrinsics.width_px, max(window.right for window in windows)),
-            min(self._intrinsics.height_px, max(window.bottom for window in windows)),
+            min(width, max(window.right for window in windows)),
+            min(height, max(window.bottom for window in windows)),
         )
 
-    def _shadow(self, placed: PlacedObject, time_s: float) -> Shadow:
-        x, y, heading = placed.pose_at(time_s)
-        if placed.moves:
-            return cast_shadow(placed.asset, heading, self._towards_light).at(x, y)
-        if placed.object_id not in self._shadows:
-            self._shadows[placed.object_id] = cast_shadow(placed.asset, heading, self._towards_light).at(x, y)
-        return self._shadows[placed.object_id]
+    def _shadows_in(self, view: View, objects: Sequence[PlacedObject]) -> list[Shadow]:
+        """Shadows of the objects that are near; those of objects that stand still are cast once."""
+        shadows = []
+        for placed in objects:
+            x, y, heading = placed.pose_at(view.time_s)
+            if np.hypot(*(view.eye_m[:2] - (x, y))) > SHADOWS_TO_M:
+                continue
+            shadow = self._shadows.get(placed.object_id)
+            if shadow is None:
+                shadow = cast_shadow(placed.asset, heading, self._light.towards()).at(x, y)
+                if not placed.moves:
+                    self._shadows[placed.object_id] = shadow
+            shadows.append(shadow)
+        return shadows
 
-    def _render(self, view: View, window: Window, scale: float) -> tuple[Image, NDArray[np.int32]]:
-        """Colours (h, w, 3) and body ids (h, w) of a window at `scale` times the image's resolution."""
-        width = max(1, round((window.right - window.left) * scale))
-        height = max(1, round((window.bottom - window.top) * scale))
-        # PyBullet samples a pixel at its lower left corner; half a pixel's shift brings it to the middle.
-        right_px = 0.5 * (window.right - window.left) / width - self._intrinsics.width_px / 2
-        down_px = -0.5 * (window.bottom - window.top) / height - self._intrinsics.height_px / 2
-        per_px = NEAR_M / self._intrinsics.focal_px
-        projection = pybullet.computeProjectionMatrix(
-            (window.left + right_px) * per_px,
-            (window.right + right_px) * per_px,
-            -(window.bottom + down_px) * per_px,
-            -(window.top + down_px) * per_px,
-            NEAR_M,
-            2 * FAR_M,
-        )
-        forwards, down = view.world_from_optical[:, 2], view.world_from_optical[:, 1]
-        looking = pybullet.computeViewMatrix(view.eye_m.tolist(), (view.eye_m + forwards).tolist(), (-down).tolist())
-        _, _, colours, _, body_ids = pybullet.getCameraImage(
-            width,
-            height,
-            looking,
-            projection,
-            lightDirection=(100 * self._towards_light).tolist(),
-            lightColor=[1.0, 1.0, 1.0],
-            lightAmbientCoeff=self._light.ambient,
-            lightDiffuseCoeff=self._light.diffuse,
-            lightSpecularCoeff=0.05,
-            shadow=0,
-            renderer=pybullet.ER_TINY_RENDERER,
-            physicsClientId=self._client,
-        )
-        return np.reshape(colours, (height, width, 4))[..., :3].copy(), np.reshape(body_ids, (height, width))
+
+def _corners(placed: PlacedObject) -> Floats:
+    """Corners (8, 3) of an object's bounding box in its own frame."""
+    low, high = placed.asset.bounds_m
+    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
 
 
 def _lay_over(image: Image, window: Window, colours: Image, covered: NDArray[np.bool_]) -> None:
@@ -242,7 +180,7 @@ def _lay_over(image: Image, window: Window, colours: Image, covered: NDArray[np.
     target = image[window.top : window.bottom, window.left : window.right]
     size = (target.shape[1], target.shape[0])
     hole = cv2.resize(np.where(covered, np.uint8(0), np.uint8(255)), size, interpolation=cv2.INTER_AREA)[..., None]
-    # Where no object is, PyBullet gives white: what the finer colours average to there is the hole itself.
+    # Where no object is, the finer colours are white: what they average to there is the hole itself.
     front = cv2.subtract(cv2.resize(colours, size, interpolation=cv2.INTER_AREA), np.repeat(hole, 3, axis=2))
     behind = (target.astype(np.uint16) * hole + 127) // 255
     target[:] = cv2.add(front, behind.astype(np.uint8))

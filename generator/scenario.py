@@ -4,18 +4,24 @@ The names, units and defaults here are those of the TOML files; `schemas/json/sc
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, ConfigDict, Field, TypeAdapter
 
 from generator.assets import catalog, ground, sky
+from generator.sensor_specs import (
+    CONFIG,
+    CameraSpec,
+    LidarSpec,
+    NotNegative,
+    OdometrySpec,
+    Positive,
+    TruthSpec,
+)
 
-_CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False)
-
-Positive = Annotated[float, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-Share = Annotated[float, Field(ge=0, lt=1)]
 Seed = Annotated[int, Field(ge=0)]
 Point = tuple[float, float]
 
@@ -39,7 +45,7 @@ Sky = Annotated[str, AfterValidator(_among(sky.KINDS)), Field(json_schema_extra=
 class ObjectSpec:
     """An object of the world."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
 
     kind: Annotated[Kind, Field(alias="class")]
     """Class or distractor, as the generator's catalog names it."""
@@ -61,7 +67,7 @@ class ObjectSpec:
 class GroupsSpec:
     """Groups of objects at random places, and a way past them; `seed` decides."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
 
     count: Annotated[int, Field(ge=1)]
     """How many groups."""
@@ -83,7 +89,7 @@ class GroupsSpec:
 class GroundSpec:
     """The ground."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
 
     kind: Ground = "concrete"
     """What it is made of."""
@@ -97,7 +103,7 @@ class GroundSpec:
 class BackgroundSpec:
     """Sky and horizon."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
 
     kind: Sky = "hills"
     """What stands along the horizon."""
@@ -109,7 +115,7 @@ class BackgroundSpec:
 class LightSpec:
     """The sun."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
 
     azimuth_deg: float = 50.0
     """Direction that the light comes from, counter-clockwise from x."""
@@ -122,12 +128,18 @@ class LightSpec:
     shade: Annotated[float, Field(ge=0, le=1)] = 0.45
     """Share of the light that a shadow on the ground takes."""
 
+    def towards(self) -> NDArray[np.float64]:
+        """Unit vector (3,) from the world to the sun."""
+        azimuth, elevation = np.deg2rad(self.azimuth_deg), np.deg2rad(self.elevation_deg)
+        level = np.cos(elevation)
+        return np.array([np.cos(azimuth) * level, np.sin(azimuth) * level, np.sin(elevation)])
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotSpec:
     """The robot, a Turtlebot3 Waffle Pi."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
 
     start: tuple[float, float, float] | None = None
     """x in m, y in m and heading in degrees at the start; on the first waypoint if left out."""
@@ -136,126 +148,10 @@ class RobotSpec:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SensorSpec:
-    """When a sensor measures: at phase + k / rate, give or take its jitter."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
-
-    rate_hz: Positive
-    """Measurements per second."""
-    phase_s: NotNegative = 0.0
-    """Time of the first measurement."""
-    jitter_s: NotNegative = 0.0
-    """Standard deviation of the time of each measurement, cut at 0.4 periods."""
-    latency_s: NotNegative = 0.0
-    """The header's stamp is this much later than the measurement."""
-    delay_s: NotNegative = 0.0
-    """The log time is this much later than the end of the measurement, stamped."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CameraSpec(SensorSpec):
-    """The camera."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
-
-    rate_hz: Positive = 10.0
-    """Images per second."""
-    phase_s: NotNegative = 0.013
-    """Time of the first image."""
-    jitter_s: NotNegative = 0.001
-    """Standard deviation of the time of each image, cut at 0.4 periods."""
-    delay_s: NotNegative = 0.03
-    """The log time is this much later than the stamp."""
-    when: Literal["always", "stops", "never"] = "always"
-    """Whether it takes images always, only while the robot stands at a stop, or never."""
-    width_px: Annotated[int, Field(ge=16, le=4096)] = 640
-    """Width of the image."""
-    height_px: Annotated[int, Field(ge=16, le=4096)] = 480
-    """Height of the image."""
-    field_of_view_deg: Annotated[float, Field(ge=5, le=150)] = 62.2
-    """Horizontal field of view."""
-    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 85
-    """Quality of the JPEG."""
-    exposure: Positive = 1.0
-    """Brightness of the images."""
-    exposure_jitter: NotNegative = 0.02
-    """Standard deviation of the brightness from image to image, as a share."""
-    exposure_s: NotNegative = 0.005
-    """Time that the shutter is open: a turning robot blurs the image."""
-    blur_px: NotNegative = 0.4
-    """Standard deviation of the lens's blur."""
-    noise: NotNegative = 2.0
-    """Standard deviation of the sensor's noise, in grey levels of 255."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LidarSpec(SensorSpec):
-    """The LiDAR."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
-
-    rate_hz: Positive = 5.0
-    """Scans per second."""
-    phase_s: NotNegative = 0.05
-    """Time of the first beam of the first scan."""
-    jitter_s: NotNegative = 0.0005
-    """Standard deviation of the time of each scan, cut at 0.4 periods."""
-    delay_s: NotNegative = 0.004
-    """The log time is this much later than the last beam."""
-    beams: Annotated[int, Field(ge=8, le=7200)] = 360
-    """Beams from 0 to 6.28 rad, the last one included: 360 are 1.00228 degrees apart."""
-    range_min_m: NotNegative = 0.12
-    """Nearest range; a nearer echo is no return."""
-    range_max_m: Positive = 15.0
-    """Farthest range; a beam without an echo before it is no return."""
-    sigma_m: NotNegative = 0.01
-    """Standard deviation of a range."""
-    dropout: Share = 0.002
-    """Share of beams that return nothing."""
-    instantaneous: bool = False
-    """All beams at the time of the first one, as Gazebo does."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OdometrySpec(SensorSpec):
-    """The odometry."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
-
-    rate_hz: Positive = 30.0
-    """Messages per second."""
-    jitter_s: NotNegative = 0.0005
-    """Standard deviation of the time of each message, cut at 0.4 periods."""
-    delay_s: NotNegative = 0.001
-    """The log time is this much later than the stamp."""
-    source: Literal["encoders", "world"] = "encoders"
-    """From the wheels, starting at 0; or the true pose in the frame map, as Gazebo can give it."""
-    radius_error: Annotated[float, Field(gt=-0.5, lt=0.5)] = 0.0
-    """How much too large the assumed radius of the wheels is, as a share."""
-    baseline_error: Annotated[float, Field(gt=-0.5, lt=0.5)] = 0.0
-    """How much too large the assumed distance of the wheels is, as a share."""
-    distance_slip: NotNegative = 0.02
-    """Standard deviation of the distance after 1 m, in m; grows with the root of the distance."""
-    heading_slip_deg: NotNegative = 0.5
-    """Standard deviation of the heading after 1 m; grows with the root of the distance."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TruthSpec:
-    """The ground truth."""
-
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
-
-    rate_hz: Positive = 30.0
-    """Poses per second."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Waypoint:
     """A point of the way."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
 
     at: Point
     """Where, in metres of the frame map."""
@@ -274,7 +170,7 @@ class Waypoint:
 class TrajectorySpec:
     """The way of the robot: straight from point to point, corners cut by the lookahead."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
 
     waypoints: tuple[Waypoint, ...] = ()
     """Points of the way, in order."""
@@ -288,7 +184,7 @@ class TrajectorySpec:
 class Scenario:
     """A world, a robot and its way: all that a simulated recording is made from."""
 
-    __pydantic_config__: ClassVar[ConfigDict] = _CONFIG
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
 
     description: str = ""
     """What the scenario is for, in one sentence."""
@@ -300,20 +196,25 @@ class Scenario:
     """The objects of the world."""
     groups: GroupsSpec | None = None
     """Groups of objects at random places, beside `objects`; their way stands in for `trajectory.waypoints`."""
-    ground: GroundSpec = GroundSpec()
-    background: BackgroundSpec = BackgroundSpec()
-    light: LightSpec = LightSpec()
-    robot: RobotSpec = RobotSpec()
-    camera: CameraSpec = CameraSpec()
-    lidar: LidarSpec = LidarSpec()
-    odometry: OdometrySpec = OdometrySpec()
-    truth: TruthSpec = TruthSpec()
-    trajectory: TrajectorySpec = TrajectorySpec()
+    ground: GroundSpec = field(default_factory=GroundSpec)
+    background: BackgroundSpec = field(default_factory=BackgroundSpec)
+    light: LightSpec = field(default_factory=LightSpec)
+    robot: RobotSpec = field(default_factory=RobotSpec)
+    camera: CameraSpec = field(default_factory=CameraSpec)
+    lidar: LidarSpec = field(default_factory=LidarSpec)
+    odometry: OdometrySpec = field(default_factory=OdometrySpec)
+    truth: TruthSpec = field(default_factory=TruthSpec)
+    trajectory: TrajectorySpec = field(default_factory=TrajectorySpec)
 
 
 ADAPTER: TypeAdapter[Scenario] = TypeAdapter(Scenario)
 
 
 def json_schema() -> dict[str, Any]:
-    """JSON schema of a scenario's TOML file (its `extends` is resolved before)."""
-    return ADAPTER.json_schema()
+    """JSON schema of a scenario's TOML file."""
+    schema = ADAPTER.json_schema()
+    schema["properties"]["extends"] = {
+        "type": "string",
+        "description": "Name of a bundled scenario, or a file beside this one, over whose values these are laid.",
+    }
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 
 _ACCELERATION_MPS2 = 0.5
 _TURN_ACCELERATION_RADPS2 = 3.0
+# Faster through a bend, the wheels would slide.
+_SIDEWAYS_MPS2 = 0.8
 # Braking is planned softer than it could be, so that the wheels can follow.
 _BRAKING = 0.7
 _TURN_FIRST_RAD = np.deg2rad(25.0)
@@ -130,7 +132,8 @@ class Driver:
             sideways = -np.sin(self._pose[2]) * aim[0] + np.cos(self._pose[2]) * aim[1]
             curvature = float(2 * sideways / (aim @ aim))
             braking = np.sqrt(2 * _BRAKING * self._limits.acceleration * left)
-            cornering = 0.8 * self._limits.turn / max(abs(curvature), 1e-9)
+            bend = max(abs(curvature), 1e-9)
+            cornering = min(0.8 * self._limits.turn / bend, np.sqrt(_SIDEWAYS_MPS2 / bend))
             speed = max(_LEAST_SPEED_MPS, min(self._limits.speed, braking, cornering, 8.0 * left))
             yield speed, speed * curvature, False
 

@@ -1,0 +1,128 @@
+"""What a scenario says about its sensors and their noise, as checked dataclasses."""
+
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import ConfigDict, Field
+
+CONFIG = ConfigDict(extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False)
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Share = Annotated[float, Field(ge=0, lt=1)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SensorSpec:
+    """When a sensor measures: at phase + k / rate, give or take its jitter."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
+
+    rate_hz: Positive
+    """Measurements per second."""
+    phase_s: NotNegative = 0.0
+    """Time of the first measurement."""
+    jitter_s: NotNegative = 0.0
+    """Standard deviation of the time of each measurement, cut at 0.4 periods."""
+    latency_s: NotNegative = 0.0
+    """The header's stamp is this much later than the measurement."""
+    delay_s: NotNegative = 0.0
+    """The log time is this much later than the end of the measurement, stamped."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CameraSpec(SensorSpec):
+    """The camera."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
+
+    rate_hz: Positive = 10.0
+    """Images per second."""
+    phase_s: NotNegative = 0.013
+    """Time of the first image."""
+    jitter_s: NotNegative = 0.001
+    """Standard deviation of the time of each image, cut at 0.4 periods."""
+    delay_s: NotNegative = 0.03
+    """The log time is this much later than the stamp."""
+    when: Literal["always", "stops", "never"] = "always"
+    """Whether it takes images always, only while the robot stands at a stop, or never."""
+    width_px: Annotated[int, Field(ge=16, le=4096)] = 640
+    """Width of the image."""
+    height_px: Annotated[int, Field(ge=16, le=4096)] = 480
+    """Height of the image."""
+    field_of_view_deg: Annotated[float, Field(ge=5, le=150)] = 62.2
+    """Horizontal field of view."""
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 85
+    """Quality of the JPEG."""
+    exposure: Positive = 1.0
+    """Brightness of the images."""
+    exposure_jitter: NotNegative = 0.02
+    """Standard deviation of the brightness from image to image, as a share."""
+    exposure_s: NotNegative = 0.005
+    """Time that the shutter is open: a turning robot blurs the image."""
+    blur_px: NotNegative = 0.4
+    """Standard deviation of the lens's blur."""
+    noise: NotNegative = 2.0
+    """Standard deviation of the sensor's noise, in grey levels of 255."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LidarSpec(SensorSpec):
+    """The LiDAR."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
+
+    rate_hz: Positive = 5.0
+    """Scans per second."""
+    phase_s: NotNegative = 0.05
+    """Time of the first beam of the first scan."""
+    jitter_s: NotNegative = 0.0005
+    """Standard deviation of the time of each scan, cut at 0.4 periods."""
+    delay_s: NotNegative = 0.004
+    """The log time is this much later than the last beam."""
+    beams: Annotated[int, Field(ge=8, le=7200)] = 360
+    """Beams from 0 to 6.28 rad, the last one included: 360 are 1.00228 degrees apart."""
+    range_min_m: NotNegative = 0.12
+    """Nearest range; a nearer echo is no return."""
+    range_max_m: Positive = 15.0
+    """Farthest range; a beam without an echo before it is no return."""
+    sigma_m: NotNegative = 0.01
+    """Standard deviation of a range."""
+    dropout: Share = 0.002
+    """Share of beams that return nothing."""
+    instantaneous: bool = False
+    """All beams at the time of the first one, as Gazebo does."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OdometrySpec(SensorSpec):
+    """The odometry."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
+
+    rate_hz: Positive = 30.0
+    """Messages per second."""
+    jitter_s: NotNegative = 0.0005
+    """Standard deviation of the time of each message, cut at 0.4 periods."""
+    delay_s: NotNegative = 0.001
+    """The log time is this much later than the stamp."""
+    source: Literal["encoders", "world"] = "encoders"
+    """From the wheels, starting at 0; or the true pose in the frame map, as Gazebo can give it."""
+    radius_error: Annotated[float, Field(gt=-0.5, lt=0.5)] = 0.0
+    """How much too large the assumed radius of the wheels is, as a share."""
+    baseline_error: Annotated[float, Field(gt=-0.5, lt=0.5)] = 0.0
+    """How much too large the assumed distance of the wheels is, as a share."""
+    distance_slip: NotNegative = 0.02
+    """Standard deviation of the distance after 1 m, in m; grows with the root of the distance."""
+    heading_slip_deg: NotNegative = 0.5
+    """Standard deviation of the heading after 1 m; grows with the root of the distance."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TruthSpec:
+    """The ground truth."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
+
+    rate_hz: Positive = 30.0
+    """Poses per second."""
