@@ -27,17 +27,14 @@ def command(
     json: options.Json = False,
 ) -> None:
     """Localize every bundle of scene objects in LOG... in a landmark map; write the input with pose and match."""
-    from toolkit.runs.bundles import Span
     from toolkit.runs.config import gather, load
-    from toolkit.runs.inputs import Choice, parse_remaps
     from toolkit.runs.outputs import output_files
     from toolkit.runs.pipeline import Job, run_stage
     from toolkit.stage import Stage
     from toolkit.stages import find_stage
 
     config = load("localize", gather(config_file, settings or [], method))
-    choice = Choice({"odometry": odom} if odom else {}, parse_remaps(remap or []))
-    span = Span(choice, options.time_ns(start, "--start"), options.time_ns(end, "--end"))
+    span = options.span(start, end, remap, {"odometry": odom})
     stage = find_stage("localize")
     assert isinstance(stage, Stage)  # noqa: S101 - localize is no reduction
     runs = []

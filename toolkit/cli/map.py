@@ -33,14 +33,10 @@ def command(
     json: options.Json = False,
 ) -> None:
     """Build one landmark map from LOG...; with -o also write each log with its results."""
-    from toolkit.runs.bundles import Span
-    from toolkit.runs.inputs import Choice, parse_remaps
-
     if from_reference:
         _from_reference(logs, map_file, json)
         return
-    choice = Choice({"odometry": odom} if odom else {}, parse_remaps(remap or []))
-    span = Span(choice, options.time_ns(start, "--start"), options.time_ns(end, "--end"))
+    span = options.span(start, end, remap, {"odometry": odom})
     run = _build(logs, map_file, prior, (config_file, settings or [], method), span, output, results_only)
     for log in run.logs:
         for reason, count in log.reading.notes().items():

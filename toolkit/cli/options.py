@@ -3,11 +3,14 @@
 import re
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from toolkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from toolkit.runs.bundles import Span
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of text.")]
 Output = Annotated[
@@ -30,6 +33,19 @@ Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="STAGE.KEY=VALUE", help="One setting; repeatable.")
 ]
 Method = Annotated[str | None, typer.Option("--method", help="Sets the method of every stage: default or thesis.")]
+
+
+def span(start: str | None, end: str | None, remaps: list[str] | None, topics: dict[str, str | None]) -> "Span":
+    """What of a log to read, from the options; `topics` by role, None where none was chosen.
+
+    Raises:
+        UsageError: a time or a remapping cannot be read.
+    """
+    from toolkit.runs.bundles import Span
+    from toolkit.runs.inputs import Choice, parse_remaps
+
+    chosen = {role: topic for role, topic in topics.items() if topic}
+    return Span(Choice(chosen, parse_remaps(remaps or [])), time_ns(start, "--start"), time_ns(end, "--end"))
 
 
 def time_ns(text: str | None, option: str) -> int | None:
