@@ -1,16 +1,16 @@
 """Fixtures that every test may use."""
 
-import os
 from pathlib import Path
 
 import pytest
+
+from tests.shared import data_folder
 
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of the data that others made; tests that need it are skipped where it is missing."""
-    default = Path(__file__).resolve().parents[2] / "shared" / "data"
-    path = Path(os.environ.get("MCAP_LANDMARKS_DATA", default))
-    if not path.is_dir():
-        pytest.skip(f"no data at {path}; set MCAP_LANDMARKS_DATA")
+    path = data_folder()
+    if path is None:
+        pytest.skip("no data at ../shared/data; set MCAP_LANDMARKS_DATA to where it lies")
     return path
