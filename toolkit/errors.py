@@ -23,3 +23,7 @@ class MessageError(ToolkitError):
 
 class MapError(ToolkitError):
     """A landmark database is missing, damaged, of another schema version, or too poor to use."""
+
+
+class ModelError(ToolkitError):
+    """An ONNX file is missing, cannot be run, or is no model of the kind that is needed."""

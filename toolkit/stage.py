@@ -90,15 +90,25 @@ class Bundle:
         return message if isinstance(message, channel.message) else None
 
 
-Process = Callable[[Iterable[Bundle], Any, Mapping[str, Path]], Iterator[Stamped]]
+@dataclass(frozen=True, slots=True)
+class Omission:
+    """Something that a stage left out: `lost` where the source data are unreadable, else by a rule of its own."""
+
+    log_time_ns: int
+    reason: str
+    lost: bool = False
+
+
+Process = Callable[[Iterable[Bundle], Any, Mapping[str, Path]], Iterator[Stamped | Omission]]
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
     """One step of the pipeline: what it reads and writes, its configuration and its code.
 
-    `config` is a dataclass type; `resources` are files that the runner opens, hashes and passes in; `tolerance` says
-    how far each field may differ between two machines.
+    The first channel of `reads` is the primary one: each of its messages makes a bundle. `config` is a dataclass type;
+    `resources` are files that the runner opens, hashes and passes in, `options` files that may be missing; `tolerance`
+    says how far each field may differ between two machines.
     """
 
     name: str
@@ -107,6 +117,7 @@ class Stage:
     config: type[Any]
     process: Process
     resources: tuple[str, ...] = ()
+    options: tuple[str, ...] = ()
     tolerance: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -67,13 +67,14 @@ def test_channels_roles_and_verbs(tmp_path: Path, capsys: pytest.CaptureFixture[
         "truth": ["/ground_truth/pose"],
     }
     assert found["verbs"] == ["map", "localize", "evaluate"]
-    assert found["missing"] == {}
+    assert found["missing"] == {"detect": ["image"]}
 
 
 def test_what_is_missing_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = document(capsys, write_ros1(tmp_path / "a.bag"))
     assert (found["profile"], found["roles"]["scan"]) == ("ros1", ["/scan"])
     assert found["missing"] == {
+        "detect": ["image"],
         "map": ["scene_objects", "odometry"],
         "localize": ["scene_objects"],
         "evaluate": ["results", "truth"],

@@ -11,7 +11,7 @@ import typer
 from toolkit.cli.console import run_command
 from toolkit.errors import UsageError
 
-_NOT_VERBS = {"__init__", "main", "console", "options"}
+_NOT_VERBS = {"__init__", "main", "console", "options", "stage_runs"}
 _HELP = "Landmark maps and positions from robot recordings, offline and without ROS."
 
 

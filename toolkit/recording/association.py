@@ -84,9 +84,13 @@ class _Trail:
 
 
 def associate(
-    messages: Iterable[tuple[Channel[Any], int, Message]], primary: Channel[Any], counts: Association
+    messages: Iterable[tuple[Channel[Any], int, Message]],
+    primary: Channel[Any],
+    counts: Association,
+    *,
+    with_odometry: bool = True,
 ) -> Iterator[Bundle]:
-    """One bundle per message of the channel `primary`, with odometry interpolated at its stamp.
+    """One bundle per message of the channel `primary`, with odometry interpolated at its stamp if that is wanted.
 
     `messages` are (channel, log time, message) by log time; every `Odometry` among them is taken as the robot's.
     Stamps are the headers', log time where those are zero. A bundle waits until odometry has passed its stamp, at most
@@ -97,7 +101,12 @@ def associate(
     for channel, log_time_ns, message in messages:
         stamp_ns = getattr(message, "stamp_ns", 0) or log_time_ns
         if channel == primary:
-            waiting.append(Bundle(stamp_ns, log_time_ns, {channel: message}))
+            bundle = Bundle(stamp_ns, log_time_ns, {channel: message})
+            if not with_odometry:
+                counts.bundles += 1
+                yield bundle
+                continue
+            waiting.append(bundle)
         elif isinstance(message, Odometry):
             trail.add(stamp_ns, message)
         while waiting and (trail.latest_ns >= waiting[0].stamp_ns or log_time_ns - waiting[0].log_time_ns > WINDOW_NS):

@@ -1,17 +1,18 @@
 """One recording as the bundles that a stage reads, in one pass."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from toolkit.channels import ODOMETRY
 from toolkit.errors import MessageError, RecordingError
 from toolkit.landmarks.sightings import usable
 from toolkit.messages.codec import Message, decode
 from toolkit.messages.scene import SceneObjects
 from toolkit.recording.association import Association, associate
 from toolkit.recording.reader import Recording
-from toolkit.runs.inputs import ROLES, Choice, choose
+from toolkit.runs.inputs import ROLES, Choice, choose, message_type
 from toolkit.stage import Bundle, Channel, Connection, RawMessage
 
 
@@ -31,6 +32,22 @@ class Reading:
     association: Association = field(default_factory=Association)
     dropped: Counter[str] = field(default_factory=Counter)
     losses: list[str] = field(default_factory=list)
+    unreadable: Counter[str] = field(default_factory=Counter)
+
+    def lose(self, topic: str, log_time_ns: int, reason: str) -> None:
+        """Count a message that cannot be read; the first of a topic is told in full."""
+        self.unreadable[topic] += 1
+        if self.unreadable[topic] == 1:
+            self.losses.append(f"{topic} at {log_time_ns}: {reason}")
+
+    def close(self, losses: Iterable[str]) -> None:
+        """Sum up when everything was read; `losses` are the recording's own."""
+        self.losses.extend(
+            f"{topic}: {count} messages could not be decoded in all"
+            for topic, count in self.unreadable.items()
+            if count > 1
+        )
+        self.losses.extend(losses)
 
     def notes(self) -> dict[str, int]:
         """Everything that was left out by rule, in words, with its count; nothing where nothing was."""
@@ -76,34 +93,31 @@ def _missing(recording: Recording, channel: Channel[Any], empty: bool) -> str:
 def read_bundles(
     raws: Iterable[RawMessage],
     inputs: Mapping[Connection, Channel[Any]],
-    primary: Channel[Any],
+    reads: Sequence[Channel[Any]],
     reading: Reading,
 ) -> Iterator[Bundle]:
-    """The bundles of messages by log time; `reading` is kept up to date.
+    """The bundles of messages by log time, one per message of the first channel of `reads`.
+
+    They wait for odometry if `reads` has it. `reading` is kept up to date.
 
     A message that cannot be decoded is a loss, an unusable object is dropped; both are counted.
     """
-    return associate(_decoded(raws, inputs, reading), primary, reading.association)
+    decoded = _decoded(raws, inputs, reading)
+    return associate(decoded, reads[0], reading.association, with_odometry=ODOMETRY in reads)
 
 
 def _decoded(
     raws: Iterable[RawMessage], inputs: Mapping[Connection, Channel[Any]], reading: Reading
 ) -> Iterator[tuple[Channel[Any], int, Message]]:
-    broken: Counter[str] = Counter()
     for raw in raws:
         channel = inputs.get(raw.connection)
         if channel is None:
             continue
         try:
-            message: Message = decode(channel.message, raw.data)
+            message: Message = decode(message_type(channel, raw.connection), raw.data)
         except MessageError as error:
-            broken[raw.connection.topic] += 1
-            if broken[raw.connection.topic] == 1:
-                reading.losses.append(f"{raw.connection.topic} at {raw.log_time_ns}: {error}")
+            reading.lose(raw.connection.topic, raw.log_time_ns, str(error))
             continue
         if isinstance(message, SceneObjects):
             message = usable(message, reading.dropped)
         yield channel, raw.log_time_ns, message
-    reading.losses.extend(
-        f"{topic}: {count} messages could not be decoded in all" for topic, count in broken.items() if count > 1
-    )

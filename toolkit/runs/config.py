@@ -11,6 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from toolkit.errors import UsageError
 from toolkit.sources import source_names
+from toolkit.stage import Stage
 from toolkit.stages import find_stage, stage_names
 
 Settings = dict[str, dict[str, Any]]
@@ -79,6 +80,24 @@ def stage_config(config: type[Any], stage: str, settings: Mapping[str, Any]) -> 
 def effective(config: Any) -> dict[str, Any]:
     """Every key with its value, for the manifest."""
     return dataclasses.asdict(config)
+
+
+def load_files(stage: Stage, settings: Settings, given: Mapping[str, Path | None]) -> tuple[Any, dict[str, Path]]:
+    """The configuration of a stage, and its files: `given` ones, else those that the settings name, such as
+    `detect.model`. Files are no part of the configuration, so that no path gets into a manifest.
+
+    Raises:
+        UsageError: a file that the stage cannot do without is not given.
+    """
+    own = dict(settings.get(stage.name, {}))
+    files = {name: Path(str(own.pop(name))) for name in (*stage.resources, *stage.options) if name in own}
+    files.update({name: path for name, path in given.items() if path is not None})
+    for name in stage.resources:
+        if name not in files:
+            raise UsageError(
+                f"{stage.name} needs a {name} and none is bundled; give --{name} FILE or --set {stage.name}.{name}=FILE"
+            )
+    return stage_config(stage.config, stage.name, own), files
 
 
 def load(name: str, settings: Settings) -> Any:

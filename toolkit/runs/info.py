@@ -18,6 +18,7 @@ _BY_TOPIC = {
     RESULTS: (MATCH.topic, POSE.topic, MAP_POSE.topic),
 }
 NEEDS: Mapping[str, tuple[str, ...]] = {
+    "detect": ("image",),
     "map": ("scene_objects", "odometry"),
     "localize": ("scene_objects",),
     "evaluate": (RESULTS, TRUTH),

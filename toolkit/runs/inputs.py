@@ -2,10 +2,16 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import Any
 
 from toolkit import channels
 from toolkit.errors import UsageError
+from toolkit.messages.codec import Message
+from toolkit.messages.images import CameraInfo, CompressedImage, Image
+from toolkit.messages.poses import Odometry
+from toolkit.messages.scan import LaserScan
+from toolkit.messages.scene import SceneObjects
 from toolkit.recording.reader import Recording
 from toolkit.stage import Channel, Connection
 
@@ -14,19 +20,24 @@ OWN_OBJECTS = frozenset({"/landmarks/scan_objects", channels.MAP.topic, channels
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """What a channel is to the stages, the option that chooses its topic, and the message types that fit."""
+    """What a channel is to the stages, the option that chooses its topic, and the messages that fit."""
 
     name: str
     option: str
-    types: tuple[str, ...]
+    messages: tuple[type[Message], ...]
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """The message types that fit."""
+        return tuple(message.ROS_TYPE for message in self.messages)
 
 
 ROLES: Mapping[Channel[Any], Role] = {
-    channels.CAMERA_IMAGE: Role("image", "--image", ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image")),
-    channels.CAMERA_INFO: Role("camera_info", "--remap", ("sensor_msgs/msg/CameraInfo",)),
-    channels.SCAN: Role("scan", "--scan", ("sensor_msgs/msg/LaserScan",)),
-    channels.ODOMETRY: Role("odometry", "--odom", ("nav_msgs/msg/Odometry",)),
-    channels.SCENE_OBJECTS: Role("scene_objects", "--remap", ("vision_msgs/msg/Detection3DArray",)),
+    channels.CAMERA_IMAGE: Role("image", "--image", (CompressedImage, Image)),
+    channels.CAMERA_INFO: Role("camera_info", "--remap", (CameraInfo,)),
+    channels.SCAN: Role("scan", "--scan", (LaserScan,)),
+    channels.ODOMETRY: Role("odometry", "--odom", (Odometry,)),
+    channels.SCENE_OBJECTS: Role("scene_objects", "--remap", (SceneObjects,)),
 }
 
 
@@ -95,3 +106,31 @@ def choose(recording: Recording, channel: Channel[Any], choice: Choice) -> tuple
                 f"{' or '.join(role.types)}"
             )
     return found
+
+
+def message_type(channel: Channel[Any], connection: Connection) -> type[Message]:
+    """The dataclass of a connection's messages, where it is read as a channel: an image has two."""
+    role = ROLES.get(channel)
+    fitting = (message for message in role.messages if connection.message_type == message.ROS_TYPE) if role else ()
+    return next(iter(fitting), channel.message)
+
+
+def beside_camera_info(recording: Recording, channel: Channel[Any], image: Connection) -> Channel[Any]:
+    """A channel moved into the namespace of an image's camera, where Foxglove looks for annotations.
+
+    That is the parent of the CameraInfo topic that shares most of the image's path, else of the image topic.
+    """
+    kind = CameraInfo.ROS_TYPE
+    infos = [entry.connection.topic for entry in recording.channels if entry.connection.message_type == kind]
+    shared = {topic: _shared(image.topic, topic) for topic in infos}
+    base = image.topic.removesuffix("/compressed")
+    nearest = max(sorted(infos), key=shared.__getitem__, default=base)
+    if len(infos) > 1 and not shared[nearest]:  # several cameras, none of them this one
+        nearest = base
+    return Channel(f"{nearest.rpartition('/')[0]}/{channel.topic.rpartition('/')[2]}", channel.message)
+
+
+def _shared(one: str, other: str) -> int:
+    """The number of namespaces that two topics share."""
+    pairs = zip(one.strip("/").split("/")[:-1], other.strip("/").split("/")[:-1], strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))

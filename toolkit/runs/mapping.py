@@ -59,8 +59,8 @@ def collect_log(stage: Reduction, config: Any, path: Path, span: Span, progress:
     with open_recording(path) as recording:
         inputs = inputs_of(recording, stage.reads, (SCENE_OBJECTS, ODOMETRY), span.choice)
         raws = recording.messages(tuple(inputs), span.start_ns, span.end_ns, progress)
-        observations = stage.collect(read_bundles(raws, inputs, SCENE_OBJECTS, reading), config)
-        reading.losses.extend(recording.losses)
+        observations = stage.collect(read_bundles(raws, inputs, stage.reads, reading), config)
+        reading.close(recording.losses)
         fingerprint = recording.fingerprint()
     if not len(observations.stamps_ns):
         raise RecordingError(

@@ -6,26 +6,27 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from toolkit.channels import ODOM_FRAME, SCENE_OBJECTS, TF, TF_STATIC
+from toolkit.channels import ANNOTATIONS, ODOM_FRAME, TF, TF_STATIC
 from toolkit.errors import UsageError
 from toolkit.manifest import RUN, Manifest, file_hash
 from toolkit.messages.codec import decode
-from toolkit.messages.match import LandmarkMatch
 from toolkit.recording.blocks import Progress
 from toolkit.recording.reader import Recording, open_recording
 from toolkit.recording.writer import RecordingWriter, create_recording
 from toolkit.runs.bundles import Reading, Span, inputs_of, read_bundles
 from toolkit.runs.config import effective
-from toolkit.stage import Connection, RawMessage, Stage
+from toolkit.runs.inputs import beside_camera_info
+from toolkit.runs.tallies import tally
+from toolkit.stage import Channel, Connection, Omission, RawMessage, Stage, Stamped
 
 
 @dataclass(slots=True)
 class StageRun:
-    """What a stage did: where the output is, bundles by status, and what became of the input."""
+    """What a stage did: where the output is, what its results count, and what became of the input."""
 
     output: Path
     reading: Reading
-    statuses: Counter[str] = field(default_factory=Counter)
+    counts: Counter[str] = field(default_factory=Counter)
     notes: list[str] = field(default_factory=list)
 
 
@@ -51,9 +52,11 @@ def run_stage(stage: Stage, config: Any, job: Job, progress: Progress | None = N
     reading = Reading()
     run = StageRun(job.output, reading)
     with open_recording(job.recording) as recording:
-        inputs = inputs_of(recording, stage.reads, (SCENE_OBJECTS,), job.span.choice)
-        writes = _writes(stage, recording, config, run)
-        replaced = {connection for topic in writes - {TF.topic} for connection in recording.connections(topic)}
+        inputs = inputs_of(recording, stage.reads, stage.reads[:1], job.span.choice)
+        primary = next(connection for connection, channel in inputs.items() if channel == stage.reads[0])
+        writes = _writes(stage, recording, primary, config, run)
+        topics = {channel.topic for channel in writes.values()} - {TF.topic}
+        replaced = {connection for topic in topics for connection in recording.connections(topic)}
         manifest = Manifest(
             verb=stage.name,
             config={stage.name: effective(config)},
@@ -65,17 +68,18 @@ def run_stage(stage: Stage, config: Any, job: Job, progress: Progress | None = N
         metadata = {**recording.metadata, RUN: manifest.entries()}
         with create_recording(job.output, metadata) as writer:
             raws = _copy(recording, writer, job, inputs, replaced, progress)
-            bundles = read_bundles(raws, inputs, SCENE_OBJECTS, reading)
-            for stamped in stage.process(bundles, config, job.resources):
-                if stamped.channel.topic not in writes:
-                    continue
-                if isinstance(stamped.message, LandmarkMatch):
-                    run.statuses[stamped.message.status.name.lower()] += 1
-                writer.add(stamped, group=stage.name)
+            bundles = read_bundles(raws, inputs, stage.reads, reading)
+            for result in stage.process(bundles, config, job.resources):
+                if isinstance(result, Omission):
+                    _omit(result, primary, reading)
+                elif result.channel in writes:
+                    run.counts.update(tally(result.message))
+                    channel = writes[result.channel]
+                    writer.add(Stamped(channel, result.log_time_ns, result.message), group=stage.name)
             if not job.results_only:
                 for attachment in recording.attachments():
                     writer.attach(attachment)
-            reading.losses.extend(recording.losses)
+            reading.close(recording.losses)
     return run
 
 
@@ -101,15 +105,29 @@ def _copy(
         yield raw
 
 
-def _writes(stage: Stage, recording: Recording, config: Any, run: StageRun) -> set[str]:
-    """Topics that the stage may write: without /tf if the odometry frame has a parent already."""
-    topics = {channel.topic for channel in stage.writes}
-    if TF.topic in topics and getattr(config, "tf", "auto") == "auto" and _odom_has_parent(recording):
-        topics.remove(TF.topic)
+def _omit(omission: Omission, primary: Connection, reading: Reading) -> None:
+    if omission.lost:
+        reading.lose(primary.topic, omission.log_time_ns, omission.reason)
+    else:
+        reading.dropped[omission.reason] += 1
+
+
+def _writes(
+    stage: Stage, recording: Recording, primary: Connection, config: Any, run: StageRun
+) -> dict[Channel[Any], Channel[Any]]:
+    """The stage's channels and those that they become here.
+
+    Annotations follow the camera's namespace; /tf is left out if the odometry frame has a parent already.
+    """
+    writes = {channel: channel for channel in stage.writes}
+    if ANNOTATIONS in writes:
+        writes[ANNOTATIONS] = beside_camera_info(recording, ANNOTATIONS, primary)
+    if TF in writes and getattr(config, "tf", "auto") == "auto" and _odom_has_parent(recording):
+        del writes[TF]
         run.notes.append(
             f"{recording.path}: {ODOM_FRAME} has a parent frame already; no map -> odom transform is written"
         )
-    return topics
+    return writes
 
 
 def _odom_has_parent(recording: Recording) -> bool:

@@ -1,0 +1,36 @@
+"""Work in overlapping steps: prepare and run items ahead in threads, results in the order of the items."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Prepared = TypeVar("Prepared")
+Result = TypeVar("Result")
+
+AHEAD = 4
+"""Items under way at once: enough to keep the slowest step busy, few enough to bound memory."""
+
+
+def in_order(
+    items: Iterable[Item], prepare: Callable[[Item], Prepared], run: Callable[[Prepared], Result]
+) -> Iterator[tuple[Item, Result]]:
+    """Every item with `run(prepare(item))`; what either raises is raised when the item's turn comes.
+
+    Items are drawn and results taken in the caller's thread, so both may do I/O; `run` is never called twice at once.
+    """
+    under_way: deque[tuple[Item, Future[Result]]] = deque()
+    with ThreadPoolExecutor(2) as preparing, ThreadPoolExecutor(1) as running:
+
+        def finish(prepared: "Future[Prepared]") -> Result:
+            return run(prepared.result())
+
+        for item in items:
+            under_way.append((item, running.submit(finish, preparing.submit(prepare, item))))
+            while under_way and (len(under_way) >= AHEAD or under_way[0][1].done()):
+                first, future = under_way.popleft()
+                yield first, future.result()
+        while under_way:
+            first, future = under_way.popleft()
+            yield first, future.result()

@@ -1,0 +1,1 @@
+"""Pixels and boxes: images to RGB, letterbox, the YOLOv5 contract, decoding, NMS, and the ONNX session."""
