@@ -2,13 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from toolkit.estimation.pose import PoseSolutions, solve_poses
+from toolkit.estimation.batch import PoseSolutions
+from toolkit.estimation.calibration import SensorModel, calibrate
+from toolkit.estimation.pose import solve_poses
 from toolkit.estimation.sightings import polar_from_points
 from toolkit.geometry.se2 import Array, transform_points
 from toolkit.landmarks.model import LandmarkMap
@@ -31,6 +33,8 @@ class Settings(Protocol):
     def robust_dof(self) -> float: ...
     @property
     def consistency(self) -> float: ...
+    @property
+    def calibrate(self) -> bool: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,16 +55,88 @@ class _Problem:
     landmarks: NDArray[np.int64]
 
 
-def locate(scenes: Sequence[SceneObjects], landmark_map: LandmarkMap, settings: Settings) -> list[Located]:
-    """Pose of each scene's base in the map, from the landmarks whose class is unique."""
-    landmark_of = unique_classes(landmark_map)
-    problems = [_Problem(scene, *pairs_by_class(scene.classes, landmark_of)) for scene in scenes]
-    located = [_too_few(problem) for problem in problems]
-    rows = [i for i, result in enumerate(located) if result is None]
-    if rows:
-        for i, result in zip(rows, _solve([problems[i] for i in rows], landmark_map, settings), strict=True):
-            located[i] = result
-    return [result for result in located if result is not None]
+@dataclass(frozen=True, slots=True, eq=False)
+class _Given:
+    """Problems as arrays (B, K), padded to the largest; `mask` says what is there. See `solve_poses`."""
+
+    landmarks_xy: Array
+    landmark_covariance: Array
+    range_m: Array
+    bearing_rad: Array
+    covariance: Array
+    mask: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, problems: Sequence[_Problem], landmark_map: LandmarkMap, settings: Settings) -> Self:
+        """Arrays of B problems."""
+        count, width = len(problems), max(len(problem.objects) for problem in problems)
+        points, covariances = np.ones((count, width, 2)), np.tile(np.eye(2), (count, width, 1, 1))
+        landmarks, spread = np.zeros((count, width, 2)), np.zeros((count, width, 2, 2))
+        mask = np.zeros((count, width), dtype=np.bool_)
+        for i, problem in enumerate(problems):
+            k = len(problem.objects)
+            mask[i, :k] = True
+            points[i, :k] = problem.scene.positions_xy[problem.objects]
+            known = known_covariances(problem.scene, settings.range_sigma_m, settings.bearing_sigma_rad)
+            covariances[i, :k] = known[problem.objects]
+            landmarks[i, :k] = landmark_map.positions_xy[problem.landmarks]
+            spread[i, :k] = landmark_map.covariances[problem.landmarks]
+        return cls(landmarks, spread, *polar_from_points(points, covariances), mask)
+
+
+class Locator:
+    """Localizes the scenes of one log, batch by batch; what its sensor's ranges mean is found from the first batch."""
+
+    def __init__(self, landmark_map: LandmarkMap, settings: Settings) -> None:
+        self._map = landmark_map
+        self._settings = settings
+        self._landmark_of = unique_classes(landmark_map)
+        self._sensor: SensorModel | None = None if settings.calibrate else SensorModel()
+
+    def locate(self, scenes: Sequence[SceneObjects]) -> list[Located]:
+        """Pose of each scene's base in the map, from the landmarks whose class is unique."""
+        problems = [_Problem(scene, *pairs_by_class(scene.classes, self._landmark_of)) for scene in scenes]
+        located = [_too_few(problem) for problem in problems]
+        rows = [i for i, result in enumerate(located) if result is None]
+        if rows:
+            for i, result in zip(rows, self._solve([problems[i] for i in rows]), strict=True):
+                located[i] = result
+        return [result for result in located if result is not None]
+
+    def _solve(self, problems: Sequence[_Problem]) -> list[Located]:
+        """Solve all; drop the worst observation of those that do not fit while three or more are left."""
+        settings = self._settings
+        given = _Given.of(problems, self._map, settings)
+        if self._sensor is None:
+            self._sensor = calibrate(
+                given.landmarks_xy,
+                given.range_m,
+                given.bearing_rad,
+                given.covariance,
+                landmark_covariance=given.landmark_covariance,
+                mask=given.mask,
+            )
+        distance_m = self._sensor.distance_m(given.range_m, given.bearing_rad)
+        mask = given.mask.copy()
+        while True:
+            solutions = solve_poses(
+                given.landmarks_xy,
+                distance_m,
+                given.bearing_rad,
+                given.covariance,
+                landmark_covariance=given.landmark_covariance,
+                mask=mask,
+                robust_dof=settings.robust_dof or None,
+            )
+            fits = solutions.chi2 <= chi2.ppf(1 - settings.consistency, np.maximum(solutions.dof, 1))
+            worse = np.flatnonzero(~fits & (mask.sum(axis=1) > 2))
+            if not len(worse):
+                break
+            mask[worse, np.argmax(np.where(mask, solutions.observation_chi2, -1.0)[worse], axis=1)] = False
+        return [
+            _judge(problem, i, solutions, mask[i], distance_m[i], bool(fits[i]), self._map, settings)
+            for i, problem in enumerate(problems)
+        ]
 
 
 def _too_few(problem: _Problem) -> Located | None:
@@ -72,39 +148,12 @@ def _too_few(problem: _Problem) -> Located | None:
     return None
 
 
-def _solve(problems: Sequence[_Problem], landmark_map: LandmarkMap, settings: Settings) -> list[Located]:
-    """Solve all; drop the worst observation of those that do not fit while three or more are left."""
-    count, width = len(problems), max(len(problem.objects) for problem in problems)
-    points, covariances = np.ones((count, width, 2)), np.tile(np.eye(2), (count, width, 1, 1))
-    landmarks, spread = np.zeros((count, width, 2)), np.zeros((count, width, 2, 2))
-    mask = np.zeros((count, width), dtype=np.bool_)
-    for i, problem in enumerate(problems):
-        k = len(problem.objects)
-        mask[i, :k] = True
-        points[i, :k] = problem.scene.positions_xy[problem.objects]
-        known = known_covariances(problem.scene, settings.range_sigma_m, settings.bearing_sigma_rad)
-        covariances[i, :k] = known[problem.objects]
-        landmarks[i, :k] = landmark_map.positions_xy[problem.landmarks]
-        spread[i, :k] = landmark_map.covariances[problem.landmarks]
-    range_m, bearing_rad, polar = polar_from_points(points, covariances)
-    robust = settings.robust_dof or None
-    while True:
-        solutions = solve_poses(
-            landmarks, range_m, bearing_rad, polar, landmark_covariance=spread, mask=mask, robust_dof=robust
-        )
-        fits = solutions.chi2 <= chi2.ppf(1 - settings.consistency, np.maximum(solutions.dof, 1))
-        worse = np.flatnonzero(~fits & (mask.sum(axis=1) > 2))
-        if not len(worse):
-            break
-        mask[worse, np.argmax(np.where(mask, solutions.observation_chi2, -1.0)[worse], axis=1)] = False
-    return [_judge(problems[i], i, solutions, mask[i], bool(fits[i]), landmark_map, settings) for i in range(count)]
-
-
 def _judge(
     problem: _Problem,
     i: int,
     solutions: PoseSolutions,
     used: NDArray[np.bool_],
+    distance_m: Array,
     fits: bool,
     landmark_map: LandmarkMap,
     settings: Settings,
@@ -119,7 +168,9 @@ def _judge(
         status = Status.INCONSISTENT
     elif not solutions.converged[i] or sigma_m > settings.max_sigma_m:
         status = Status.WEAK_GEOMETRY
-    miss = transform_points(pose, scene.positions_xy[objects]) - landmark_map.positions_xy[landmarks]
+    points = scene.positions_xy[objects]
+    points = points * (distance_m[kept] / np.maximum(np.hypot(points[:, 0], points[:, 1]), 1e-9))[:, None]
+    miss = transform_points(pose, points) - landmark_map.positions_xy[landmarks]
     match = LandmarkMatch(
         scene.stamp_ns,
         scene.frame_id,

@@ -24,10 +24,10 @@ from toolkit.messages.match import Status
 from toolkit.messages.poses import PoseStamped, PoseWithCovarianceStamped
 from toolkit.messages.transforms import TFMessage, Transform
 from toolkit.stage import Bundle, Stage, Stamped
-from toolkit.stages._localize_default import Located, locate
+from toolkit.stages._localize_default import Located, Locator
 from toolkit.stages._localize_thesis import locate_as_in_the_thesis
 
-_BATCH = 512
+_BATCH = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +36,11 @@ class LocalizeConfig:
 
     `max_sigma_m`: a pose whose own position sigma (square root of the largest eigenvalue) is above it is refused.
     `range_sigma_m` and `bearing_sigma_rad` stand in for covariances that the log leaves unknown. `robust_dof`: degrees
-    of the Student-t distribution that observations weigh by; 0 weighs them by their covariance alone. `consistency` is
-    the probability under which a set of objects that do fit is refused. `tf`: write map -> odom, or never.
-    `thesis_guess_m`: the fixed initial guess of the thesis's solver, which the thesis does not print.
+    of the Student-t distribution that observations weigh by; 0 weighs them by their covariance alone. `consistency`:
+    the probability under which a set of objects that do fit is refused. `calibrate` finds from the first bundles
+    whether ranges are distances or depths, and their offset, and corrects them where that explains far more than
+    chance. `tf`: write map -> odom, or never. `thesis_guess_m`: the fixed initial guess of the thesis's solver, which
+    the thesis does not print.
     """
 
     method: Literal["default", "thesis"] = "default"
@@ -47,6 +49,7 @@ class LocalizeConfig:
     bearing_sigma_rad: float = 0.01
     robust_dof: float = 0.0
     consistency: float = 1e-3
+    calibrate: bool = True
     tf: Literal["auto", "never"] = "auto"
     thesis_guess_m: tuple[float, float] = (0.0, 0.0)
 
@@ -54,14 +57,18 @@ class LocalizeConfig:
 def process(bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Path]) -> Iterator[Stamped]:
     """Match and pose of every bundle, the map once before the first."""
     landmark_map = read_map(resources["map"])
-    solve = locate_as_in_the_thesis if config.method == "thesis" else locate
+    locator = Locator(landmark_map, config)
     stream, first = iter(bundles), True
     while batch := list(islice(stream, _BATCH)):
         if first:
             yield Stamped(MAP, batch[0].log_time_ns, scene_from_map(landmark_map, batch[0].stamp_ns))
             first = False
         scenes = [scene for bundle in batch if (scene := bundle.get(SCENE_OBJECTS)) is not None]
-        for bundle, located in zip(batch, solve(scenes, landmark_map, config), strict=True):
+        if config.method == "thesis":
+            found = locate_as_in_the_thesis(scenes, landmark_map, config)
+        else:
+            found = locator.locate(scenes)
+        for bundle, located in zip(batch, found, strict=True):
             yield from _messages(bundle, located, landmark_map.frame, config)
 
 
