@@ -16,7 +16,7 @@ from generator.scenario import LightSpec
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
-NEAR_M, FAR_M = 0.05, 60.0
+NEAR_M = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,10 +47,11 @@ class Window:
 class Drawing:
     """A PyBullet client that draws the objects it is shown; a context manager that disconnects it."""
 
-    def __init__(self, intrinsics: Intrinsics, light: LightSpec) -> None:
+    def __init__(self, intrinsics: Intrinsics, light: LightSpec, far_m: float) -> None:
+        """Nothing beyond `far_m` in front of the camera is drawn."""
         self._client: int = pybullet.connect(pybullet.DIRECT)
         self._store = AssetStore(self._client)
-        self._intrinsics, self._light = intrinsics, light
+        self._intrinsics, self._light, self._far_m = intrinsics, light, far_m
         self._bodies: dict[str, tuple[Body, ...]] = {}
 
     def __enter__(self) -> Self:
@@ -113,6 +114,6 @@ class Drawing:
             -(window.bottom + down_px) * per_px,
             -(window.top + down_px) * per_px,
             NEAR_M,
-            FAR_M,
+            self._far_m,
         )
         return matrix

@@ -26,16 +26,22 @@ SHADOWS_TO_M = 12.0
 SUPERSAMPLING = 2
 """Objects are rendered this many times finer than the image, for smooth edges."""
 # Silhouettes of larger windows are rendered coarser.
-_SILHOUETTE_AREA_PX = 60_000
+_SILHOUETTE_AREA_PX = 30_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Visible:
-    """An object in view: `window` holds all of it, the parts outside the image included."""
+    """An object in view: `window` holds all of it, the parts outside the image included; distances bound it, too."""
 
     placed: PlacedObject
     bodies: tuple[Body, ...]
     window: Window
+    nearest_m: float
+    farthest_m: float
+
+    def may_hide(self, other: "Visible") -> bool:
+        """Whether any of it can be nearer than some of the other one."""
+        return self.nearest_m < other.farthest_m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,12 +57,20 @@ class Rendered:
 class Renderer:
     """Draws one scenario's world from any place; a context manager that disconnects from PyBullet."""
 
-    def __init__(self, scenario: Scenario, objects: Sequence[PlacedObject]) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        objects: Sequence[PlacedObject],
+        far_m: float = FAR_M,
+        shadows_to_m: float = SHADOWS_TO_M,
+    ) -> None:
+        """`far_m` and `shadows_to_m`, along the ground, are how far objects and their shadows are drawn."""
+        self._far_m, self._shadows_to_m = far_m, shadows_to_m
         self._intrinsics = Intrinsics.of(scenario.camera)
         self._light = scenario.light
         self._stack = ExitStack()
-        self._world = self._stack.enter_context(Drawing(self._intrinsics, self._light))
-        self._alone = self._stack.enter_context(Drawing(self._intrinsics, self._light))
+        self._world = self._stack.enter_context(Drawing(self._intrinsics, self._light, 2 * far_m))
+        self._alone = self._stack.enter_context(Drawing(self._intrinsics, self._light, 2 * far_m))
         self._objects = objects
         self._centres = np.array([placed.route_xy[0] for placed in objects]).reshape(-1, 2)
         self._moving = np.array([placed.moves for placed in objects], dtype=bool)
@@ -92,7 +106,9 @@ class Renderer:
             self._light.shade,
         )
         bodies = self._world.show([placed for placed, _ in in_view], view.time_s)
-        visible = tuple(Visible(placed, body, window) for (placed, window), body in zip(in_view, bodies, strict=True))
+        visible = tuple(
+            _visible(view, placed, body, window) for (placed, window), body in zip(in_view, bodies, strict=True)
+        )
         window = self._inner_window([one.window for one in visible])
         if window is None:
             return Rendered(image, np.full((0, 0), -1, np.int32), None, visible)
@@ -113,13 +129,13 @@ class Renderer:
         """Objects within reach whose bounding box meets the image, with the window that holds the box."""
         away = self._centres - view.eye_m[:2]
         ahead = away @ view.world_from_optical[:2, 2] > -self._reach_m
-        near = np.hypot(away[:, 0], away[:, 1]) < FAR_M + self._reach_m
+        near = np.hypot(away[:, 0], away[:, 1]) < self._far_m + self._reach_m
         found = []
         for i in np.flatnonzero((ahead & near) | self._moving).tolist():
             placed = self._objects[i]
             pose = placed.pose_at(view.time_s)
             window = self._window(view, self._corners[i], pose)
-            if window is not None and np.hypot(*(pose[:2] - view.eye_m[:2])) < FAR_M:
+            if window is not None and np.hypot(*(pose[:2] - view.eye_m[:2])) < self._far_m:
                 found.append((placed, window))
         return found
 
@@ -158,7 +174,7 @@ class Renderer:
         shadows = []
         for placed in objects:
             x, y, heading = placed.pose_at(view.time_s)
-            if np.hypot(*(view.eye_m[:2] - (x, y))) > SHADOWS_TO_M:
+            if np.hypot(*(view.eye_m[:2] - (x, y))) > self._shadows_to_m:
                 continue
             shadow = self._shadows.get(placed.object_id)
             if shadow is None:
@@ -167,6 +183,12 @@ class Renderer:
                     self._shadows[placed.object_id] = shadow
             shadows.append(shadow)
         return shadows
+
+
+def _visible(view: View, placed: PlacedObject, bodies: tuple[Body, ...], window: Window) -> Visible:
+    distance = float(np.hypot(*(placed.pose_at(view.time_s)[:2] - view.eye_m[:2])))
+    reach = placed.asset.footprint_radius_m
+    return Visible(placed, bodies, window, distance - reach, distance + reach)
 
 
 def _corners(placed: PlacedObject) -> Floats:

@@ -25,7 +25,8 @@ def true_detections(rendered: Rendered, renderer: Renderer, view: View, stamp_ns
         if seen is None:
             continue
         share = 1.0
-        if seen.is_cut or _beyond_edge(one, renderer):
+        beside = [other for other in rendered.visible if other is not one and seen.borders_on(other)]
+        if _beyond_edge(one, renderer) or any(other.may_hide(one) for other in beside):
             share = min(1.0, seen.area_px / max(renderer.silhouette_px(view, one), seen.area_px))
         names.append(one.placed.object_id)
         options.append(((one.placed.asset.name, round(share, 3)),))
@@ -35,11 +36,15 @@ def true_detections(rendered: Rendered, renderer: Renderer, view: View, stamp_ns
 
 @dataclass(frozen=True, slots=True)
 class _Seen:
-    """Box and area, in pixels of the image, of what shows of an object; `is_cut`: other objects border on it."""
+    """Box and area, in pixels of the image, of what shows of an object, and the bodies of others right beside it."""
 
     box_xyxy: tuple[float, float, float, float]
     area_px: float
-    is_cut: bool
+    bodies_beside: frozenset[int]
+
+    def borders_on(self, other: Visible) -> bool:
+        """Whether a body of the other object is right beside it; whatever hides a part of it borders on the rest."""
+        return any(body.body_id in self.bodies_beside for body in other.bodies)
 
 
 def _seen(rendered: Rendered, one: Visible) -> _Seen | None:
@@ -60,10 +65,9 @@ def _seen(rendered: Rendered, one: Visible) -> _Seen | None:
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     x = left + np.array([columns[0], columns[-1] + 1]) / SUPERSAMPLING
     y = top + np.array([rows[0], rows[-1] + 1]) / SUPERSAMPLING
-    # Whatever hides a part of it borders on the rest.
     border = cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool) & ~mask
-    is_cut = bool((part[border] >= 0).any())
-    return _Seen((float(x[0]), float(y[0]), float(x[1]), float(y[1])), area_px, is_cut)
+    beside = frozenset(np.unique(part[border]).tolist())
+    return _Seen((float(x[0]), float(y[0]), float(x[1]), float(y[1])), area_px, beside)
 
 
 def _beyond_edge(one: Visible, renderer: Renderer) -> bool:

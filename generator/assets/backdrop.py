@@ -11,12 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from generator.assets import sky
 from generator.assets.asset import Asset
 from generator.assets.solid import rotation
-from generator.assets.texture import Image, look_up
+from generator.assets.texture import Image, look_up, to_image
 
 Floats = NDArray[np.floating]
 
 SHADOW_CELL_M = 0.02
 SHADOW_BLUR_M = 0.03
+# Rays flatter than this meet no ground.
+LOWEST_RAY = np.float32(-1e-5)
 # A low sun would throw shadows without end.
 LOWEST_LIGHT = 0.35
 
@@ -76,7 +78,9 @@ class Backdrop:
         while len(levels[-1]) > 1:
             half = len(levels[-1]) // 2
             levels.append(levels[-1].reshape(half, 2, half, 2, 3).mean(axis=(1, 3)))
-        self._levels = levels
+        # With its first row and column again at the end, a tile needs no look beyond its edge.
+        border = ((0, 1), (0, 1), (0, 0))
+        self._levels: list[Image] = [np.pad(to_image(level), border, mode="wrap") for level in levels]
 
     def view(
         self,
@@ -90,31 +94,72 @@ class Backdrop:
 
         `shade` is the share of light that a shadow takes.
         """
-        place = np.asarray(eye, np.float32)
-        rays = directions.reshape(-1, 3).astype(np.float32)
-        downwards = rays[:, 2] < -1e-5
-        image = np.empty((len(rays), 3), np.uint8)
-        image[~downwards] = sky.sample(self._panorama, rays[~downwards])
-        rays = rays[downwards]
-        distance = place[2] / -rays[:, 2]
-        points = place[:2] + distance[:, None] * rays[:, :2]
-        # A pixel covers a far patch that is long along the ray; the geometric mean of its sides is a fair compromise.
-        footprint = pixel_rad * distance * np.sqrt(distance / place[2])
-        colours = self._ground(points, footprint)
-        for shadow in shadows:
-            shadow.darken(colours, points, shade)
-        image[downwards] = np.rint(colours).astype(np.uint8)
-        return image.reshape(directions.shape)
+        place = np.asarray(eye, np.float64)
+        rays = directions.astype(np.float32, copy=False)
+        downwards = rays[..., 2] < LOWEST_RAY
+        image = np.empty(rays.shape, np.uint8)
+        above, below = _rows_with(~downwards), _rows_with(downwards)
+        if above is not None:
+            image[above] = sky.sample(self._panorama, rays[above].reshape(-1, 3)).reshape(rays[above].shape)
+        if below is not None:
+            ground = self._ground(place, rays[below], pixel_rad, shadows, shade)
+            np.copyto(image[below], ground, where=downwards[below][..., None])
+        return image
 
-    def _ground(self, points_xy: Floats, footprint_m: Floats) -> NDArray[np.float32]:
-        """Ground colours (N,3) at points (N,2), each as if averaged over its footprint (N,)."""
-        texel = self._tile_m / len(self._levels[0])
-        wanted = np.rint(np.log2(np.maximum(footprint_m / texel, 1.0))).astype(int)
-        level_of_point = np.minimum(wanted, len(self._levels) - 1)
-        colours = np.empty((len(points_xy), 3), np.float32)
-        for index in np.unique(level_of_point):
-            level = self._levels[index]
-            chosen = np.flatnonzero(level_of_point == index)
-            place = np.mod(points_xy[chosen] / self._tile_m, 1.0) * len(level) - 0.5
-            colours[chosen] = look_up(level, place[:, 0], len(level) - 1 - place[:, 1], repeats=True)
+    def _ground(
+        self, eye: Floats, rays: NDArray[np.float32], pixel_rad: float, shadows: Sequence[Shadow], shade: float
+    ) -> Image:
+        """The ground (h,W,3) along rays (h,W,3); of a ray that meets it nowhere, anything."""
+        distance = np.float32(eye[2]) / np.maximum(-rays[..., 2], -LOWEST_RAY)
+        # Counted from a corner of the tile below the eye: single precision is enough anywhere in the world.
+        corner = np.floor(eye[:2] / self._tile_m) * self._tile_m
+        points = (eye[:2] - corner).astype(np.float32) + distance[..., None] * rays[..., :2]
+        # A pixel covers a far patch that is long along the ray; the geometric mean of its sides is a fair compromise.
+        texel = self._tile_m / (len(self._levels[0]) - 1)
+        footprint = np.float32(pixel_rad / texel) * distance * np.sqrt(distance / np.float32(eye[2]))
+        wanted = np.rint(np.log2(np.maximum(footprint, 1.0))).astype(np.uint8)
+        level_of_pixel = np.minimum(wanted, len(self._levels) - 1)
+        colours = np.empty(rays.shape, np.uint8)
+        for index, level in enumerate(self._levels):
+            chosen = level_of_pixel == index
+            rows = _rows_with(chosen)
+            if rows is not None:
+                np.copyto(colours[rows], self._tiled(level, points[rows]), where=chosen[rows][..., None])
+        span = np.stack(
+            [[axis.min(axis=1), axis.max(axis=1)] for axis in np.ascontiguousarray(np.moveaxis(points, 2, 0))]
+        )
+        for shadow in shadows:
+            _darken_rows(replace(shadow, low_xy=shadow.low_xy - corner), colours, points, span, shade)
         return colours
+
+    def _tiled(self, level: Image, points_xy: NDArray[np.float32]) -> Image:
+        """Colours (h,W,3) of the ground at points (h,W,2) in one level of the pyramid, bilinear."""
+        size = len(level) - 1
+        place = points_xy * np.float32(size / self._tile_m)
+        column, row = place[..., 0] - np.float32(0.5), np.float32(size - 0.5) - place[..., 1]
+        column -= size * np.floor(column / size)
+        row -= size * np.floor(row / size)
+        return np.asarray(cv2.remap(level, column, row, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.uint8)
+
+
+def _rows_with(chosen: NDArray[np.bool_]) -> slice | None:
+    """The rows from the first to the last with a chosen pixel, None if there is none."""
+    rows = np.flatnonzero(chosen.any(axis=1))
+    return slice(int(rows[0]), int(rows[-1]) + 1) if len(rows) else None
+
+
+def _darken_rows(
+    shadow: Shadow, colours: Image, points: NDArray[np.float32], span: NDArray[np.float32], share: float
+) -> None:
+    """Let a shadow fall on ground colours (h,W,3) at points (h,W,2), in place.
+
+    `span` has the least and greatest x and y (2,2,h) of each row: only rows that the shadow can reach are looked at.
+    """
+    height, width = shadow.darkness.shape
+    high_xy = shadow.low_xy + SHADOW_CELL_M * np.array([width, height])
+    meets = np.all((span[:, 0] < high_xy[:, None]) & (span[:, 1] > shadow.low_xy[:, None]), axis=0)
+    rows = _rows_with(np.asarray(meets)[:, None])
+    if rows is not None:
+        darkened = colours[rows].reshape(-1, 3).astype(np.float32)
+        shadow.darken(darkened, points[rows].reshape(-1, 2), share)
+        colours[rows] = np.rint(darkened).astype(np.uint8).reshape(colours[rows].shape)

@@ -1,0 +1,61 @@
+"""The thesis's scenarios against its appendices."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from generator.bundled import FOLDER
+from generator.loading import load_scenario
+from toolkit.geometry.angles import wrap
+
+_DATA = Path(__file__).parents[1] / "data"
+_HIGHEST_BEARING_DEG = 31.1
+
+
+def appendix(name: str) -> list[list[Any]]:
+    lines = (_DATA / f"thesis_appendix_{name}.txt").read_text().splitlines()
+    return [json.loads(line[line.index("[") :].replace("'", '"')) for line in lines if "[" in line]
+
+
+def test_the_map_s_world_is_appendix_c() -> None:
+    scenario = load_scenario("thesis_map").scenario
+    rows = appendix("c")
+    expected = [(name, x, y) for row in rows for name, x, y in row[:3]]
+    assert [(spec.kind, *spec.at) for spec in scenario.objects] == expected
+    stops = scenario.trajectory.waypoints
+    assert [point.at for point in stops] == [tuple(row[3][1:3]) for row in rows]
+    headings = [np.deg2rad(point.heading_deg) for point in stops if point.heading_deg is not None]
+    assert headings == pytest.approx([row[3][3] for row in rows], abs=1e-5)
+    assert {point.stop_s for point in stops} == {3.0}
+    assert (scenario.odometry.source, scenario.camera.when) == ("world", "stops")
+    assert {spec.variant for spec in scenario.objects} == {""}, "a person in a long coat is seen from 15 m"
+
+
+def test_the_second_log_stops_at_appendix_d_and_faces_the_groups() -> None:
+    scenario = load_scenario("thesis_localize").scenario
+    stops = scenario.trajectory.waypoints
+    assert [point.at for point in stops] == [tuple(row[1]) for row in appendix("d")]
+    for point, row in zip(stops, appendix("c"), strict=True):
+        away = np.array([spec[1:3] for spec in row[:3]]) - point.at
+        bearings = wrap(np.arctan2(away[:, 1], away[:, 0]) - np.deg2rad(point.heading_deg or 0.0))
+        assert bearings.max() == pytest.approx(-bearings.min(), abs=1e-5)
+        assert np.rad2deg(bearings.max()) < _HIGHEST_BEARING_DEG
+
+
+@pytest.mark.parametrize("name", ["thesis_map", "thesis_localize"])
+def test_with_drift_only_odometry_and_seed_differ(name: str) -> None:
+    plain, drifting = load_scenario(name).scenario, load_scenario(f"{name}_drift").scenario
+    assert (drifting.objects, drifting.trajectory) == (plain.objects, plain.trajectory)
+    assert drifting.odometry.source == "encoders"
+    assert (drifting.odometry.distance_slip, drifting.odometry.heading_slip_deg) == (0.02, 0.5)
+
+
+def test_the_loop_comes_back_after_340_m() -> None:
+    scenario = load_scenario("loop").scenario
+    points = np.array([point.at for point in scenario.trajectory.waypoints])
+    assert np.hypot(*np.diff(points, axis=0).T).sum() == pytest.approx(340, abs=5)
+    assert points[0] == pytest.approx(points[-1])
+    assert (FOLDER / "loop.toml").read_text().startswith('extends = "thesis_map"')
