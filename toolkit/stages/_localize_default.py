@@ -26,6 +26,8 @@ class Settings(Protocol):
     @property
     def max_sigma_m(self) -> float: ...
     @property
+    def max_sigma_deg(self) -> float: ...
+    @property
     def range_sigma_m(self) -> float: ...
     @property
     def bearing_sigma_rad(self) -> float: ...
@@ -117,13 +119,16 @@ class Locator:
                 mask=given.mask,
             )
         distance_m = self._sensor.distance_m(given.range_m, given.bearing_rad)
+        # The log tells how range and bearing compare; in all, sigmas stay as large as they are given.
+        shape = self._sensor.scale / self._sensor.scale.max()
+        noise = given.covariance * np.outer(shape, shape)
         mask = given.mask.copy()
         while True:
             solutions = solve_poses(
                 given.landmarks_xy,
                 distance_m,
                 given.bearing_rad,
-                given.covariance,
+                noise,
                 landmark_covariance=given.landmark_covariance,
                 mask=mask,
                 robust_dof=settings.robust_dof or None,
@@ -163,10 +168,11 @@ def _judge(
     pose, covariance = solutions.map_from_base[i], solutions.covariance[i]
     finite = np.isfinite(covariance).all()
     sigma_m = float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[-1])) if finite else np.inf
+    sigma_deg = float(np.degrees(np.sqrt(covariance[2, 2]))) if finite else np.inf
     status = Status.LOCALIZED
     if not fits:
         status = Status.INCONSISTENT
-    elif not solutions.converged[i] or sigma_m > settings.max_sigma_m:
+    elif not solutions.converged[i] or sigma_m > settings.max_sigma_m or sigma_deg > settings.max_sigma_deg:
         status = Status.WEAK_GEOMETRY
     points = scene.positions_xy[objects]
     points = points * (distance_m[kept] / np.maximum(np.hypot(points[:, 0], points[:, 1]), 1e-9))[:, None]

@@ -34,7 +34,8 @@ _BATCH = 4096
 class LocalizeConfig:
     """How bundles are localized.
 
-    `max_sigma_m`: a pose whose own position sigma (square root of the largest eigenvalue) is above it is refused.
+    `max_sigma_m`: a pose whose own position sigma (square root of the largest eigenvalue) is above it is refused, and
+    so is one whose heading sigma is above `max_sigma_deg`: three of them are the 20 degrees that make a pose false.
     `range_sigma_m` and `bearing_sigma_rad` stand in for covariances that the log leaves unknown. `robust_dof`: degrees
     of the Student-t distribution that observations weigh by; 0 weighs them by their covariance alone. `consistency`:
     the probability under which a set of objects that do fit is refused. `calibrate` finds from the first bundles
@@ -45,6 +46,7 @@ class LocalizeConfig:
 
     method: Literal["default", "thesis"] = "default"
     max_sigma_m: float = 0.5
+    max_sigma_deg: float = 6.5
     range_sigma_m: float = 0.05
     bearing_sigma_rad: float = 0.01
     robust_dof: float = 0.0
