@@ -178,9 +178,8 @@ def answering(
     input_shape: Sequence[Side | None] = (1, 3, 64, 64),
     *,
     inputs: Sequence[str] = ("images",),
-    declared: Mapping[str, Sequence[Side | None]] = {},
 ) -> Path:
-    """Write a network that gives the same outputs whatever it sees; `declared` are shapes that it claims."""
+    """Write a network that gives the same outputs whatever it sees."""
     half = any(array.dtype == np.float16 for array in outputs.values())
     kind = TensorProto.FLOAT16 if half else TensorProto.FLOAT
     nodes, constants = [], [numpy_helper.from_array(np.asarray(0, np.float16 if half else np.float32), "zero")]
@@ -190,8 +189,18 @@ def answering(
         constants.append(numpy_helper.from_array(array, f"{name}_content"))
         nodes.append(helper.make_node("Add", [f"{name}_content", "nothing"], [name]))
     given = [helper.make_tensor_value_info(name, kind, input_shape) for name in inputs]
-    found = [helper.make_tensor_value_info(name, kind, declared.get(name, a.shape)) for name, a in outputs.items()]
+    found = [helper.make_tensor_value_info(name, kind, a.shape) for name, a in outputs.items()]
     _save(path, helper.make_graph(nodes, "answering", given, found, constants), metadata)
+    return path
+
+
+def averaging(path: Path) -> Path:
+    """Write a network whose output [1, width] is as long as its input is wide."""
+    node = helper.make_node("ReduceMean", ["images", "axes"], ["output"], keepdims=0)
+    axes = numpy_helper.from_array(np.array([1, 2]), "axes")
+    given = helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, "h", "w"])
+    found = helper.make_tensor_value_info("output", TensorProto.FLOAT, [1, "w"])
+    _save(path, helper.make_graph([node], "averaging", [given], [found], [axes]), NO_METADATA)
     return path
 
 
