@@ -40,6 +40,7 @@ def command(
 def _document(run: "StageRun") -> dict[str, object]:
     return {
         "images": run.reading.association.bundles,
+        "unreadable": run.reading.unreadable.total(),
         "detections": run.counts.total(),
         "classes": dict(sorted(run.counts.items())),
     }
