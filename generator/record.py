@@ -3,14 +3,13 @@
 import importlib.metadata
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
 
 from generator.camera import ImageJob
 from generator.checks import Staged
 from generator.loading import effective
-from generator.rendering import Darkroom, Messages, picked_up
+from generator.rendering import Darkroom, Messages
 from generator.simulation import Simulation
 from toolkit.errors import ToolkitError
 from toolkit.manifest import RUN, Manifest
@@ -42,7 +41,7 @@ def record(staged: Staged, path: Path, workers: int = 1, progress: Callable[[int
     if not staged.scenario.trajectory.waypoints:
         raise ToolkitError(f"{staged.name}: trajectory.waypoints is empty; one with stop_s records a standing robot")
     simulation = Simulation(staged)
-    with Darkroom(staged, workers) as darkroom, create_recording(path, {RUN: manifest(staged).entries()}) as writer:
+    with create_recording(path, {RUN: manifest(staged).entries()}) as writer, Darkroom(staged, workers) as darkroom:
         for message in _in_order(simulation.run(progress), darkroom, workers):
             writer.add(message)
         counts = dict(writer.counts)
@@ -63,25 +62,18 @@ def manifest(staged: Staged) -> Manifest:
 
 def _in_order(events: Iterator[Stamped | ImageJob], darkroom: Darkroom, workers: int) -> Iterator[Stamped]:
     """Messages in the order of the events, while the images behind the first one are being rendered."""
-    waiting: deque[Stamped | Future[Messages]] = deque()
-    jobs = 0
+    waiting: deque[Stamped | ImageJob] = deque()
     for event in events:
+        waiting.append(event)
         if isinstance(event, ImageJob):
-            waiting.append(darkroom.submit(event))
-            jobs += 1
-        else:
-            waiting.append(event)
-        while waiting and (_ready(waiting[0]) or jobs > _JOBS_PER_WORKER * workers or len(waiting) > _MOST_WAITING):
-            first = waiting.popleft()
-            jobs -= isinstance(first, Future)
-            yield from _messages(first)
+            darkroom.hand_in(event)
+        too_many = darkroom.waiting > _JOBS_PER_WORKER * workers or len(waiting) > _MOST_WAITING
+        while waiting and (isinstance(waiting[0], Stamped) or darkroom.is_ready() or too_many):
+            yield from _messages(waiting.popleft(), darkroom)
+            too_many = False
     for first in waiting:
-        yield from _messages(first)
+        yield from _messages(first, darkroom)
 
 
-def _ready(item: "Stamped | Future[Messages]") -> bool:
-    return isinstance(item, Stamped) or item.done()
-
-
-def _messages(item: "Stamped | Future[Messages]") -> Messages:
-    return (item,) if isinstance(item, Stamped) else picked_up(item)
+def _messages(event: Stamped | ImageJob, darkroom: Darkroom) -> Messages:
+    return (event,) if isinstance(event, Stamped) else darkroom.pick_up()

@@ -1,10 +1,11 @@
 """Renders images in this process or in several workers: the pictures are the same."""
 
-from collections.abc import Callable
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+import signal
+from collections import deque
 from contextlib import ExitStack
 from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
 from typing import Self
 
 import cv2
@@ -21,6 +22,8 @@ from toolkit.messages.images import CompressedImage
 from toolkit.stage import Stamped
 
 Messages = tuple[Stamped, ...]
+
+_DIED = "a rendering worker died, perhaps for lack of memory; try --workers 1"
 
 
 class Photographer:
@@ -53,52 +56,87 @@ class Photographer:
 
 
 class Darkroom:
-    """Where jobs are handed in and their messages picked up; a context manager that ends its workers."""
+    """Where jobs are handed in and their messages picked up in order; a context manager that ends its workers.
+
+    Jobs go to the workers in turn, each over its own pipe: nothing is shared that a killed worker could leave locked.
+    """
 
     def __init__(self, staged: Staged, workers: int) -> None:
-        self._stack = ExitStack()
-        self._take: Callable[[ImageJob], Messages] | None = None
-        if workers == 1:
-            photographer = Photographer(staged)
-            self._stack.callback(photographer.close)
-            self._take = photographer.take
-        else:
-            self._pool = ProcessPoolExecutor(workers, get_context("spawn"), _start_worker, (staged,))
-            self._stack.callback(self._pool.shutdown, cancel_futures=True)
+        """One worker is this process itself."""
+        self._handed_in = self._picked_up = 0
+        self._done: deque[Messages] = deque()
+        self._photographer = Photographer(staged) if workers == 1 else None
+        context = get_context("spawn")
+        self._workers: list[tuple[SpawnProcess, Connection]] = []
+        for _ in range(workers if workers > 1 else 0):
+            ours, theirs = context.Pipe()
+            process = context.Process(target=_work, args=(staged, theirs), daemon=True)
+            process.start()
+            theirs.close()
+            self._workers.append((process, ours))
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stack.close()
+        if self._photographer is not None:
+            self._photographer.close()
+        for process, pipe in self._workers:
+            pipe.close()
+            process.terminate()
+            process.join()
 
-    def submit(self, job: ImageJob) -> "Future[Messages]":
-        """Hand in a job; without workers it is done at once."""
-        if self._take is None:
-            return self._pool.submit(_take_in_worker, job)
-        done: Future[Messages] = Future()
-        done.set_result(self._take(job))
-        return done
+    @property
+    def waiting(self) -> int:
+        """Jobs handed in and not picked up yet."""
+        return self._handed_in - self._picked_up
+
+    def hand_in(self, job: ImageJob) -> None:
+        """Have an image rendered.
+
+        Raises:
+            ToolkitError: a worker died.
+        """
+        if self._photographer is not None:
+            self._done.append(self._photographer.take(job))
+        else:
+            try:
+                self._pipe(self._handed_in).send(job)
+            except OSError as error:
+                raise ToolkitError(_DIED) from error
+        self._handed_in += 1
+
+    def is_ready(self) -> bool:
+        """Whether the next messages can be picked up without waiting."""
+        return bool(self._done) or (self.waiting > 0 and self._pipe(self._picked_up).poll())
+
+    def pick_up(self) -> Messages:
+        """The messages of the job that waits longest, once they are there.
+
+        Raises:
+            ToolkitError: a worker died.
+        """
+        if self._photographer is not None:
+            messages = self._done.popleft()
+        else:
+            try:
+                messages = self._pipe(self._picked_up).recv()
+            except (EOFError, OSError) as error:
+                raise ToolkitError(_DIED) from error
+        self._picked_up += 1
+        return messages
+
+    def _pipe(self, number: int) -> "Connection":
+        return self._workers[number % len(self._workers)][1]
 
 
-def picked_up(future: "Future[Messages]") -> Messages:
-    """The messages of a job, waiting for them.
-
-    Raises:
-        ToolkitError: a worker died.
-    """
+def _work(staged: Staged, pipe: "Connection") -> None:
+    """Take images until nobody asks for more."""
+    # An interrupt reaches every process of a terminal; the first one ends the others.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    photographer = Photographer(staged)
     try:
-        return future.result()
-    except BrokenProcessPool as error:
-        raise ToolkitError("a rendering worker was killed, perhaps for memory; try --workers 1") from error
-
-
-_photographers: list[Photographer] = []
-
-
-def _start_worker(staged: Staged) -> None:
-    _photographers.append(Photographer(staged))
-
-
-def _take_in_worker(job: ImageJob) -> Messages:
-    return _photographers[0].take(job)
+        while True:
+            pipe.send(photographer.take(pipe.recv()))
+    except (EOFError, OSError):
+        photographer.close()

@@ -1,5 +1,6 @@
 """Whole recordings: same bytes, readable by others, collisions and stuck robots reported."""
 
+import multiprocessing
 import subprocess
 import sys
 from pathlib import Path
@@ -9,9 +10,11 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
+from generator.camera import ImageJob
 from generator.checks import Staged, stage
 from generator.loading import load_scenario
 from generator.record import record
+from generator.rendering import Darkroom, Messages
 from generator.simulation import Simulation
 from tests.generator.conftest import StageText
 from toolkit.channels import CAMERA_IMAGE, ODOMETRY, SCAN, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
@@ -20,6 +23,7 @@ from toolkit.messages.codec import decode
 from toolkit.messages.poses import PoseStamped
 from toolkit.messages.scene import SceneObjects
 from toolkit.recording.reader import open_recording
+from toolkit.stage import Stamped
 
 SHORT = """\
 seed = 3
@@ -50,6 +54,23 @@ def test_one_worker_or_two_give_the_same_bytes(short: tuple[Staged, Path]) -> No
     staged, folder = short
     record(staged, folder / "two.mcap", workers=2)
     assert (folder / "one.mcap").read_bytes() == (folder / "two.mcap").read_bytes()
+
+
+def develop(darkroom: Darkroom, job: ImageJob) -> Messages:
+    darkroom.hand_in(job)
+    return darkroom.pick_up()
+
+
+def test_a_killed_worker_is_an_error(short: tuple[Staged, Path]) -> None:
+    staged, _ = short
+    jobs = [event for event in Simulation(staged).run() if isinstance(event, ImageJob)]
+    with Darkroom(staged, 2) as darkroom:
+        assert develop(darkroom, jobs[0])[0].log_time_ns == jobs[0].log_time_ns
+        for process in multiprocessing.active_children():
+            process.kill()
+            process.join()
+        with pytest.raises(ToolkitError, match="a rendering worker died"):
+            develop(darkroom, jobs[1])
 
 
 def test_another_seed_gives_other_noise_in_the_same_world(short: tuple[Staged, Path]) -> None:
@@ -147,7 +168,7 @@ def test_a_way_is_needed(stage_text: StageText, tmp_path: Path) -> None:
 
 def test_images_only_at_stops(stage_text: StageText) -> None:
     staged = stage_text(SHORT.replace("[camera]", '[camera]\nwhen = "stops"'))
-    jobs = [event for event in Simulation(staged).run() if not hasattr(event, "channel")]
+    jobs = [event for event in Simulation(staged).run() if isinstance(event, ImageJob)]
     assert 2 <= len(jobs) <= 3
     assert [job.index for job in jobs] == list(range(len(jobs)))
 
@@ -158,7 +179,7 @@ def test_laps_come_back(stage_text: StageText) -> None:
     poses = [
         event.message.pose
         for event in Simulation(staged).run()
-        if hasattr(event, "message") and isinstance(event.message, PoseStamped)
+        if isinstance(event, Stamped) and isinstance(event.message, PoseStamped)
     ]
     near_start = np.hypot(*np.array(poses)[:, :2].T) < 0.3
     assert np.count_nonzero(np.diff(near_start.astype(int)) == 1) == 1
