@@ -64,7 +64,8 @@ class Graph:
     ) -> str:
         """A convolution of (channels in, out) with SiLU, or with `bias` and nothing after it."""
         c_in, c_out = size
-        weights = self.rng.normal(0, np.sqrt(2.6 / (c_in * kernel**2)), (c_out, c_in, kernel, kernel))
+        gain = np.sqrt(2.6) if bias is None else 0.1  # keeps signals alive through SiLU, and the heads' logits small
+        weights = self.rng.normal(0, gain / np.sqrt(c_in * kernel**2), (c_out, c_in, kernel, kernel))
         self.parameters += weights.size + c_out
         if self.export.int8:
             scale = np.abs(weights).max() / 127
