@@ -34,19 +34,7 @@ def evaluated(capsys: pytest.CaptureFixture[str], *words: object) -> dict[str, A
 
 def localized(logs: Path, database: str, capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, Any]:
     output, setting = logs / f"robot1_in_{database}.mcap", "localize.max_sigma_m=0.3"
-    single = "localize.join_bundles=false"
-    call(
-        "localize",
-        logs / "d6" / "robot1.mcap",
-        "--map",
-        logs / database,
-        "-o",
-        output,
-        "--set",
-        setting,
-        "--set",
-        single,
-    )
+    call("localize", logs / "d6" / "robot1.mcap", "--map", logs / database, "-o", output, "--set", setting)
     return evaluated(capsys, output, *words)
 
 

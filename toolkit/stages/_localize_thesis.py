@@ -7,9 +7,9 @@ import numpy as np
 
 from toolkit.estimation.thesis import solve_position
 from toolkit.landmarks.model import Group, LandmarkMap
+from toolkit.landmarks.verdicts import Match
 from toolkit.messages.match import LandmarkMatch, Status
 from toolkit.messages.scene import SceneObjects
-from toolkit.stages._localize_default import Located
 
 
 class Settings(Protocol):
@@ -21,7 +21,7 @@ class Settings(Protocol):
 
 def locate_as_in_the_thesis(
     scenes: Sequence[SceneObjects], landmark_map: LandmarkMap, settings: Settings
-) -> list[Located]:
+) -> list[Match]:
     """Position of each scene of exactly three objects whose ordered classes are those of a group; it has no heading."""
     class_of = dict(zip(landmark_map.ids, landmark_map.classes, strict=True))
     last = {tuple(class_of[name] for name in group.landmark_ids): group for group in landmark_map.groups}
@@ -34,15 +34,15 @@ def _locate(
     groups: dict[tuple[str, ...], Group],
     position_of: dict[str, np.ndarray],
     settings: Settings,
-) -> Located:
+) -> Match:
     if len(scene) != 3:
         status = Status.TOO_FEW_OBJECTS if len(scene) < 3 else Status.NO_MATCH
-        return Located(LandmarkMatch(scene.stamp_ns, scene.frame_id, status))
+        return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, status))
     bearings = np.arctan2(scene.positions_xy[:, 1], scene.positions_xy[:, 0])
     order = np.argsort(-bearings, kind="stable")
     group = groups.get(tuple(scene.classes[i] for i in order))
     if group is None:
-        return Located(LandmarkMatch(scene.stamp_ns, scene.frame_id, Status.NO_MATCH))
+        return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, Status.NO_MATCH))
     landmarks = np.stack([position_of[name] for name in group.landmark_ids])
     range_m = np.linalg.norm(scene.positions_xy[order], axis=1)
     position = solve_position(landmarks, range_m, settings.thesis_guess_m)
@@ -54,4 +54,4 @@ def _locate(
         group.landmark_ids,
         np.abs(np.linalg.norm(landmarks - position, axis=1) - range_m),
     )
-    return Located(match, np.array([*position, 0.0]))
+    return Match(match, np.array([*position, 0.0]))

@@ -90,15 +90,15 @@ def decode(
     letterbox: Letterbox,
     input_px: tuple[int, int],
     contract: Contract,
+    above: NDArray[np.float32],
     config: DetectConfig,
 ) -> Found:
-    """What the network found in one image, of its outputs for an input (height, width).
+    """What the network found in one image, of its outputs for an input (height, width); `above` are the `thresholds`.
 
     Raises:
         ModelError: the outputs are none of a YOLOv5 detector.
-        UsageError: the configuration names a class that the model does not know.
     """
-    found = candidates(outputs, contract, input_px, thresholds(contract, config))
+    found = candidates(outputs, contract, input_px, above)
     found = found.take(suppress(found.boxes_xyxy, found.scores, found.class_ids, config.iou, config.max_detections))
     boxes = letterbox.in_image(found.boxes_xyxy)
     seen = (boxes[:, 2:] > boxes[:, :2]).all(axis=1)  # a box in the margins is nothing
@@ -138,7 +138,7 @@ def process(
     contract = read_contract(session, resources.get("names"), config.anchors)
     if config.method == "thesis" and not {*contract.input_px} <= {None, _THESIS_SIZE_PX}:
         raise UsageError(f"{contract.path}: the thesis's method has an input of 640 x 640; export the model with that")
-    thresholds(contract, config)  # a wrong class name shows before the first image
+    above = thresholds(contract, config)
     classifier = _classifier(resources.get("classifier"), contract, config)
     read = failed = 0
     error: MessageError | None = None
@@ -150,7 +150,7 @@ def process(
             yield Omission(bundle.log_time_ns, str(result), lost=True)
             continue
         picture, outputs = result
-        found = decode(outputs, picture.letterbox, _input_of(picture), contract, config)
+        found = decode(outputs, picture.letterbox, _input_of(picture), contract, above, config)
         yield from _messages(bundle, found, _verdicts(found, picture, contract, classifier, config))
     if error is not None and failed == read:
         raise RecordingError(f"none of {read} images could be read: {error}")

@@ -1,6 +1,6 @@
 """Localize every bundle of scene objects in a landmark map."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -19,15 +19,22 @@ from toolkit.channels import (
 )
 from toolkit.geometry.se2 import compose, inverse
 from toolkit.landmarks.database import read_map
+from toolkit.landmarks.model import LandmarkMap
 from toolkit.landmarks.scene import scene_from_map
+from toolkit.landmarks.unique import unique_classes
+from toolkit.landmarks.verdicts import Match
 from toolkit.messages.match import Status
 from toolkit.messages.poses import PoseStamped, PoseWithCovarianceStamped
+from toolkit.messages.scene import SceneObjects
 from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.stage import Bundle, Stage, Stamped
-from toolkit.stages._localize_default import Located, Locator
+from toolkit.stage import Bundle, OdometryAt, Stage, Stamped
+from toolkit.stages._localize_joined import JoinedLocator
 from toolkit.stages._localize_thesis import locate_as_in_the_thesis
+from toolkit.stages._localize_unique import UniqueLocator
 
 _BATCH = 4096
+
+Locate = Callable[[Sequence[SceneObjects], Sequence[OdometryAt | None]], list[Match]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,12 +43,19 @@ class LocalizeConfig:
 
     `max_sigma_m`: a pose whose own position sigma (square root of the largest eigenvalue) is above it is refused, and
     so is one whose heading sigma is above `max_sigma_deg`: three of them are the 20 degrees that make a pose false.
-    `range_sigma_m` and `bearing_sigma_rad` stand in for covariances that the log leaves unknown. `robust_dof`: degrees
-    of the Student-t distribution that observations weigh by; 0 weighs them by their covariance alone. `consistency`:
-    the probability under which a set of objects that do fit is refused. `calibrate` finds from the first bundles
-    whether ranges are distances or depths, and their offset, and corrects them where that explains far more than
-    chance. `tf`: write map -> odom, or never. `thesis_guess_m`: the fixed initial guess of the thesis's solver, which
-    the thesis does not print.
+    `range_sigma_m` and `bearing_sigma_rad` stand in for covariances that the log leaves unknown.
+
+    Where every class stands for one landmark: `robust_dof`, degrees of the Student-t distribution that observations
+    weigh by (0 weighs them by their covariance alone); `consistency`, the probability under which a set of objects that
+    do fit is refused; `calibrate` finds from the first bundles whether ranges are distances or depths, and their
+    offset, and corrects them where that explains far more than chance.
+
+    Where classes repeat: `accidental`, the most accidental matches to expect of a match that is accepted; `join_m`,
+    over how many metres bundles are matched together (0: each alone), through odometry whose noise per square root of
+    a metre or radian is `odometry_position_m`, `odometry_heading_rad` and `odometry_turning_rad`.
+
+    `tf`: write map -> odom, or never. `thesis_guess_m`: the fixed initial guess of the thesis's solver, which the
+    thesis does not print.
     """
 
     method: Literal["default", "thesis"] = "default"
@@ -52,6 +66,11 @@ class LocalizeConfig:
     robust_dof: float = 0.0
     consistency: float = 1e-3
     calibrate: bool = True
+    accidental: float = 2e-3
+    join_m: float = 30.0
+    odometry_position_m: float = 0.05
+    odometry_heading_rad: float = 0.05
+    odometry_turning_rad: float = 0.1
     tf: Literal["auto", "never"] = "auto"
     thesis_guess_m: tuple[float, float] = (0.0, 0.0)
 
@@ -59,32 +78,38 @@ class LocalizeConfig:
 def process(bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Path]) -> Iterator[Stamped]:
     """Match and pose of every bundle, the map once before the first."""
     landmark_map = read_map(resources["map"])
-    locator = Locator(landmark_map, config)
+    locate = _method(landmark_map, config)
     stream, first = iter(bundles), True
     while batch := list(islice(stream, _BATCH)):
         if first:
             yield Stamped(MAP, batch[0].log_time_ns, scene_from_map(landmark_map, batch[0].stamp_ns))
             first = False
         scenes = [scene for bundle in batch if (scene := bundle.get(SCENE_OBJECTS)) is not None]
-        if config.method == "thesis":
-            found = locate_as_in_the_thesis(scenes, landmark_map, config)
-        else:
-            found = locator.locate(scenes)
-        for bundle, located in zip(batch, found, strict=True):
-            yield from _messages(bundle, located, landmark_map.frame, config)
+        for bundle, match in zip(batch, locate(scenes, [bundle.odometry for bundle in batch]), strict=True):
+            yield from _messages(bundle, match, landmark_map.frame, config)
 
 
-def _messages(bundle: Bundle, located: Located, frame: str, config: LocalizeConfig) -> Iterator[Stamped]:
-    yield Stamped(MATCH, bundle.log_time_ns, located.match)
-    if located.match.status != Status.LOCALIZED or located.pose is None:
+def _method(landmark_map: LandmarkMap, config: LocalizeConfig) -> Locate:
+    """The way to localize that the configuration and the map's classes ask for."""
+    if config.method == "thesis":
+        return lambda scenes, _odometry: locate_as_in_the_thesis(scenes, landmark_map, config)
+    if len(unique_classes(landmark_map)) == np.count_nonzero(~landmark_map.tentative):
+        unique = UniqueLocator(landmark_map, config)
+        return lambda scenes, _odometry: unique.locate(scenes)
+    return JoinedLocator(landmark_map, config).locate
+
+
+def _messages(bundle: Bundle, match: Match, frame: str, config: LocalizeConfig) -> Iterator[Stamped]:
+    yield Stamped(MATCH, bundle.log_time_ns, match.message)
+    if match.message.status != Status.LOCALIZED or match.pose is None:
         return
-    pose, stamp_ns = located.pose, bundle.stamp_ns
-    if located.covariance is None:  # the thesis's solver knows no heading, and an all-zero quaternion says so
+    pose, stamp_ns = match.pose, bundle.stamp_ns
+    if match.covariance is None:  # the thesis's solver knows no heading, and an all-zero quaternion says so
         position = np.array([pose[0], pose[1], 0.0])
         yield Stamped(POSE, bundle.log_time_ns, PoseStamped(stamp_ns, frame, position, np.zeros(4)))
         return
     yield Stamped(POSE, bundle.log_time_ns, PoseStamped.planar(stamp_ns, frame, pose))
-    message = PoseWithCovarianceStamped.planar(stamp_ns, frame, pose, located.covariance)
+    message = PoseWithCovarianceStamped.planar(stamp_ns, frame, pose, match.covariance)
     yield Stamped(POSE_COVARIANCE, bundle.log_time_ns, message)
     if config.tf == "auto" and bundle.odometry is not None:
         map_from_odom = compose(pose, inverse(bundle.odometry.odom_from_base))

@@ -1,4 +1,4 @@
-"""The default way to localize: associate, solve in SE(2), test, and refuse rather than guess."""
+"""Localize where every landmark has a class of its own: associate by class, solve in SE(2), test, refuse."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +16,7 @@ from toolkit.geometry.se2 import Array, transform_points
 from toolkit.landmarks.model import LandmarkMap
 from toolkit.landmarks.sightings import known_covariances
 from toolkit.landmarks.unique import pairs_by_class, unique_classes
+from toolkit.landmarks.verdicts import Match
 from toolkit.messages.match import LandmarkMatch, Status
 from toolkit.messages.scene import SceneObjects
 
@@ -37,15 +38,6 @@ class Settings(Protocol):
     def consistency(self) -> float: ...
     @property
     def calibrate(self) -> bool: ...
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Located:
-    """One bundle's match, and where it was localized its pose (3,) with covariance (3, 3), None if that is unknown."""
-
-    match: LandmarkMatch
-    pose: Array | None = None
-    covariance: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +78,7 @@ class _Given:
         return cls(landmarks, spread, *polar_from_points(points, covariances), mask)
 
 
-class Locator:
+class UniqueLocator:
     """Localizes the scenes of one log, batch by batch; what its sensor's ranges mean is found from the first batch."""
 
     def __init__(self, landmark_map: LandmarkMap, settings: Settings) -> None:
@@ -95,7 +87,7 @@ class Locator:
         self._landmark_of = unique_classes(landmark_map)
         self._sensor: SensorModel | None = None if settings.calibrate else SensorModel()
 
-    def locate(self, scenes: Sequence[SceneObjects]) -> list[Located]:
+    def locate(self, scenes: Sequence[SceneObjects]) -> list[Match]:
         """Pose of each scene's base in the map, from the landmarks whose class is unique."""
         problems = [_Problem(scene, *pairs_by_class(scene.classes, self._landmark_of)) for scene in scenes]
         located = [_too_few(problem) for problem in problems]
@@ -105,7 +97,7 @@ class Locator:
                 located[i] = result
         return [result for result in located if result is not None]
 
-    def _solve(self, problems: Sequence[_Problem]) -> list[Located]:
+    def _solve(self, problems: Sequence[_Problem]) -> list[Match]:
         """Solve all; drop the worst observation of those that do not fit while three or more are left."""
         settings = self._settings
         given = _Given.of(problems, self._map, settings)
@@ -144,12 +136,12 @@ class Locator:
         ]
 
 
-def _too_few(problem: _Problem) -> Located | None:
+def _too_few(problem: _Problem) -> Match | None:
     scene = problem.scene
     if len(set(scene.classes)) < 2:
-        return Located(LandmarkMatch(scene.stamp_ns, scene.frame_id, Status.TOO_FEW_OBJECTS))
+        return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, Status.TOO_FEW_OBJECTS))
     if len(problem.objects) < 2:
-        return Located(LandmarkMatch(scene.stamp_ns, scene.frame_id, Status.NO_MATCH))
+        return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, Status.NO_MATCH))
     return None
 
 
@@ -162,7 +154,7 @@ def _judge(
     fits: bool,
     landmark_map: LandmarkMap,
     settings: Settings,
-) -> Located:
+) -> Match:
     scene, kept = problem.scene, np.flatnonzero(used)
     objects, landmarks = problem.objects[kept], problem.landmarks[kept]
     pose, covariance = solutions.map_from_base[i], solutions.covariance[i]
@@ -187,4 +179,4 @@ def _judge(
         chi2=float(solutions.chi2[i]),
         dof=int(solutions.dof[i]),
     )
-    return Located(match, pose, covariance) if status == Status.LOCALIZED else Located(match)
+    return Match(match, pose, covariance) if status == Status.LOCALIZED else Match(match)

@@ -1,0 +1,225 @@
+"""Search index of a landmark map: class-labelled pairs and triangles by their side lengths, in k-d trees."""
+
+from dataclasses import dataclass
+from itertools import chain
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from toolkit.errors import MapError
+from toolkit.landmarks.model import LandmarkMap
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Every landmark takes part in triangles with so many of its nearest; small maps index all of theirs.
+_NEAREST = 5
+_TRIANGLES = 200_000
+# Classes are one more coordinate of the trees, so far apart that no tolerance reaches over.
+_APART = 1e3
+_WIDEST = 400.0
+
+
+class _Lengths(NamedTuple):
+    """A tree over side lengths, and the numbers of class groups that its last coordinate counts."""
+
+    tree: cKDTree
+    keys: Ints
+
+    @classmethod
+    def of(cls, lengths: Array, numbers: Ints) -> "_Lengths":
+        keys, place = np.unique(numbers, return_inverse=True)
+        points = np.column_stack([lengths, place * _APART])
+        return cls(cKDTree(points, 32, balanced_tree=False, compact_nodes=False), keys)
+
+    def near(self, lengths: Array, numbers: Ints, tolerance: Array, most: int | None = None) -> tuple[Ints, Ints]:
+        """Which of Q queries (M,) each found member (M,) belongs to; those that find more than `most` find none."""
+        if not len(lengths) or not len(self.keys):
+            return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+        place = np.minimum(np.searchsorted(self.keys, numbers), len(self.keys) - 1)
+        known = np.flatnonzero(self.keys[place] == numbers)
+        points = np.column_stack([lengths[known], place[known] * _APART])
+        radius = np.minimum(tolerance[known], _WIDEST)
+        if most is not None:
+            few = self.tree.query_ball_point(points, radius, p=np.inf, workers=2, return_length=True) <= most
+            points, radius, known = points[few], radius[few], known[few]
+        lists = self.tree.query_ball_point(points, radius, p=np.inf, workers=2)
+        counts = np.fromiter(map(len, lists), dtype=np.int64, count=len(lists))
+        member = np.fromiter(chain.from_iterable(lists), dtype=np.int64, count=int(counts.sum()))
+        return np.repeat(known, counts), member
+
+
+class Hits(NamedTuple):
+    """What was found: of which query, and the landmarks (M, 2 or 3) in the order of the query's objects."""
+
+    query: Ints
+    landmarks: Ints
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapIndex:
+    """N landmarks of a map by position, and their pairs and triangles by class and side lengths.
+
+    `rows` (N,) are the landmarks' places in the map: tentative ones are left out. `class_of` (N,) numbers `names`.
+    `extent_m` is the distance of the nearest two that are not in one place, and the diagonal of the box around all.
+    Triangles are stored counter-clockwise and so told from their mirror images; groups of four and five objects are
+    found by any of their triangles.
+    """
+
+    landmark_map: LandmarkMap
+    rows: Ints
+    names: tuple[str, ...]
+    class_of: Ints
+    positions_xy: Array
+    covariances: Array
+    extent_m: tuple[float, float]
+    places: cKDTree
+    triangles: NDArray[np.int32]
+    pairs: NDArray[np.int32]
+    _by_sides: _Lengths
+    _by_length: _Lengths
+
+    @classmethod
+    def build(cls, landmark_map: LandmarkMap) -> "MapIndex":
+        """Index of the confirmed landmarks.
+
+        Raises:
+            MapError: no confirmed landmark, or all in one place.
+        """
+        rows = np.flatnonzero(~landmark_map.tentative)
+        positions = landmark_map.positions_xy[rows]
+        if not len(rows):
+            raise MapError("the map has no confirmed landmarks; build it from a log that sees them more often")
+        if np.ptp(positions, axis=0).max() < 1e-9:
+            raise MapError("all landmarks of the map lie in one place; a map without geometry cannot localize")
+        names, class_of = np.unique([landmark_map.classes[i] for i in rows], return_inverse=True)
+        places = cKDTree(positions, balanced_tree=False)
+        near = _neighbours(places, positions)
+        triangles = _canonical(_triangles(near), positions, class_of)
+        pairs = _pairs(near, class_of)
+        return cls(
+            landmark_map,
+            rows,
+            tuple(names.tolist()),
+            class_of,
+            positions,
+            landmark_map.covariances[rows],
+            _extent(places, positions),
+            places,
+            triangles,
+            pairs,
+            _Lengths.of(side_lengths(positions[triangles]), _number(class_of[triangles], len(names))),
+            _Lengths.of(side_lengths(positions[pairs])[:, :1], _number(class_of[pairs], len(names))),
+        )
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def kinds_of_pairs(self) -> int:
+        """How many different pairs of classes there are."""
+        return len(self._by_length.keys)
+
+    @property
+    def small(self) -> bool:
+        """Whether the map is so small that looking for unlikely classes as well costs little."""
+        return len(self.triangles) <= _TRIANGLES
+
+    def find_triangles(self, sides: Array, classes: Ints, tolerance: Array) -> Hits:
+        """Triangles like counter-clockwise ones of such sides (Q, 3), 01, 12, 20, and classes (Q, 3).
+
+        No side differs by more than `tolerance` (Q,).
+        """
+        turn = first_corner(classes, len(self.names))
+        same = (classes == classes[:, :1]).all(axis=1)
+        # A triangle of one class may have been stored from any of its corners.
+        query = np.concatenate([np.arange(len(sides)), np.repeat(np.flatnonzero(same), 2)])
+        turn = np.concatenate([turn, np.tile([1, 2], int(same.sum()))])
+        order = (turn[:, None] + np.arange(3)) % 3
+        number = _number(np.take_along_axis(classes[query], order, axis=1), len(self.names))
+        turned = np.take_along_axis(sides[query], order, axis=1)
+        found, member = self._by_sides.near(turned, number, tolerance[query])
+        landmarks = np.empty((len(found), 3), dtype=np.int64)
+        np.put_along_axis(landmarks, order[found], self.triangles[member].astype(np.int64), axis=1)
+        return Hits(query[found], landmarks)
+
+    def find_pairs(self, lengths: Array, classes: Ints, tolerance: Array, most: int) -> Hits:
+        """Pairs as far apart as `lengths` (Q,) give or take `tolerance` (Q,), of such classes (Q, 2).
+
+        What fits more than `most` of the map's pairs finds none.
+        """
+        swap = classes[:, 0] > classes[:, 1]
+        both = classes[:, 0] == classes[:, 1]
+        query = np.concatenate([np.arange(len(lengths)), np.flatnonzero(both)])
+        swap = np.concatenate([swap, np.ones(int(both.sum()), dtype=np.bool_)])
+        number = _number(np.sort(classes[query], axis=1), len(self.names))
+        found, member = self._by_length.near(lengths[query, None], number, tolerance[query], most)
+        landmarks = self.pairs[member].astype(np.int64)
+        return Hits(query[found], np.where(swap[found, None], landmarks[:, ::-1], landmarks))
+
+
+def side_lengths(points: Array) -> Array:
+    """Lengths (..., K) from each of K points (..., K, 2) to the next, the last to the first."""
+    return np.linalg.norm(points - np.roll(points, -1, axis=-2), axis=-1)
+
+
+def first_corner(classes: Ints, count: int) -> Ints:
+    """Which corner of triangles (Q, 3) comes first in the index: the one from which the classes read lowest."""
+    return np.stack([_number(np.roll(classes, -r, axis=1), count) for r in range(3)], axis=1).argmin(axis=1)
+
+
+def _number(classes: Ints, count: int) -> Ints:
+    number: Ints = classes @ (count ** np.arange(classes.shape[1])[::-1])
+    return number
+
+
+def _extent(places: cKDTree, positions: Array) -> tuple[float, float]:
+    nearest = places.query(positions, k=[2])[0]
+    widest = float(np.linalg.norm(np.ptp(positions, axis=0)))
+    return float(nearest.min(where=nearest > 0, initial=widest)), widest
+
+
+def _neighbours(places: cKDTree, positions: Array) -> Ints:
+    """The nearest landmarks (N, K) of each, nearest first."""
+    n = len(positions)
+    count = min(n - 1, max(_NEAREST, int(np.sqrt(2 * _TRIANGLES / n))))
+    near: Ints = places.query(positions, k=np.arange(1, count + 2), workers=2)[1]
+    own = near == np.arange(n)[:, None]
+    own[~own.any(axis=1), -1] = True  # landmarks in one place can push a landmark off its own list
+    return near[~own].reshape(n, count)
+
+
+def _pairs(near: Ints, class_of: Ints) -> NDArray[np.int32]:
+    """Each pair of neighbours once, lower class first."""
+    n, count = near.shape
+    a, b = np.repeat(np.arange(n), count), near.ravel()
+    keep = (a < b) | ~(near[b] == a[:, None]).any(axis=1)
+    pairs = np.stack([a[keep], b[keep]], axis=1)
+    swap = class_of[pairs[:, 0]] > class_of[pairs[:, 1]]
+    return np.where(swap[:, None], pairs[:, ::-1], pairs).astype(np.int32)
+
+
+def _triangles(near: Ints) -> Ints:
+    """Each landmark with any two of its neighbours; those found from several corners once."""
+    n, count = near.shape
+    first, second = np.triu_indices(count, 1)
+    parts = []
+    for i, j in zip(first, second, strict=True):
+        a, b, c = np.arange(n), near[:, i], near[:, j]
+        from_b = (near[b] == a[:, None]).any(axis=1) & (near[b] == c[:, None]).any(axis=1)
+        from_c = (near[c] == a[:, None]).any(axis=1) & (near[c] == b[:, None]).any(axis=1)
+        keep = ~(from_b & (b < a)) & ~(from_c & (c < a))
+        parts.append(np.stack([a, b, c], axis=1)[keep])
+    return np.concatenate(parts) if parts else np.zeros((0, 3), dtype=np.int64)
+
+
+def _canonical(triangles: Ints, positions: Array, class_of: Ints) -> NDArray[np.int32]:
+    """Counter-clockwise, from the corner where the classes read lowest."""
+    corner = positions[triangles]
+    u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    left = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] >= 0
+    triangles = np.where(left[:, None], triangles, triangles[:, [0, 2, 1]])
+    turn = first_corner(class_of[triangles], int(class_of.max()) + 1)
+    return np.take_along_axis(triangles, (turn[:, None] + np.arange(3)) % 3, axis=1).astype(np.int32)
