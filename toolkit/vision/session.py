@@ -89,6 +89,8 @@ def _open(path: Path, _version: tuple[int, int], provider: Provider, threads: in
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
     options.use_deterministic_compute = True
+    # Waiting threads that spin would take the cores that decoding, writing and other runs need.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = _ERRORS_ONLY
     try:
         session = onnxruntime.InferenceSession(str(path), options, providers=[name])

@@ -1,0 +1,110 @@
+"""The detection stage's speed against the bare network, and the network's by size."""
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import onnxruntime
+from numpy.typing import NDArray
+
+from tests.benchmark.rows import Row, main
+from tests.vision.networks import SIZES, Export, yolov5
+from toolkit.channels import CAMERA_IMAGE
+from toolkit.messages.images import CompressedImage
+from toolkit.recording.writer import create_recording
+from toolkit.runs.config import stage_config
+from toolkit.runs.pipeline import Job, run_stage
+from toolkit.stage import Stamped
+from toolkit.stages.detect import STAGE
+from toolkit.vision.letterbox import fit, tensor
+from toolkit.vision.session import open_session
+
+NAMES = [f"class {i}" for i in range(80)]
+INPUT_PX = (480, 640)
+THESIS_CPU_MS = {"n": 45.0, "s": 98.0, "m": 224.0, "l": 430.0, "x": 766.0}
+"""Milliseconds per image of 640 x 640 that the thesis gives for its CPU."""
+RATE_NS = 33_333_333
+
+
+def measure(quick: bool) -> Iterator[Row]:
+    """The rows of step 3 that need no trained model."""
+    with tempfile.TemporaryDirectory() as folder:
+        yield from _throughput(Path(folder), images=60 if quick else 200, rounds=3 if quick else 7)
+        yield from _latency(Path(folder), rounds=3 if quick else 10)
+
+
+def _picture(rng: np.random.Generator) -> NDArray[np.uint8]:
+    """Soft shapes with grain: about as hard to decode as a camera's image."""
+    coarse = rng.integers(0, 256, (12, 16, 3), dtype=np.uint8)
+    smooth = cv2.resize(coarse, INPUT_PX[::-1], interpolation=cv2.INTER_CUBIC).astype(np.int16)
+    return np.clip(smooth + rng.normal(0, 4, smooth.shape), 0, 255).astype(np.uint8)
+
+
+def _throughput(folder: Path, images: int, rounds: int) -> Iterator[Row]:
+    """Images per second: a log read, detected and written, over `session.run` on the same tensors, in turns."""
+    model, log = folder / "n.onnx", folder / "log.mcap"
+    yolov5(model, NAMES, "n", Export("h", "w", objectness_bias=-5.0))
+    rng, tensors = np.random.default_rng(0), []
+    with create_recording(log) as writer:
+        for i in range(images):
+            picture = _picture(rng)
+            data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
+            writer.add(Stamped(CAMERA_IMAGE, i * RATE_NS + 1, CompressedImage(i * RATE_NS + 1, "camera", "jpeg", data)))
+            tensors.append(tensor(picture, fit(INPUT_PX, INPUT_PX), INPUT_PX, np.dtype(np.float32)))
+    for name, threads in (("throughput", 0), ("throughput_1_thread", 1)):
+        yield _against_bare(name, threads, (model, log, folder / "out.mcap"), tensors, rounds)
+
+
+def _against_bare(
+    name: str, threads: int, files: tuple[Path, Path, Path], tensors: list[NDArray[Any]], rounds: int
+) -> Row:
+    """The stage against onnxruntime as it comes, both with so many threads (0: one per core)."""
+    model, log, out = files
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = threads
+    session = onnxruntime.InferenceSession(str(model), options, providers=["CPUExecutionProvider"])
+    config = stage_config(STAGE.config, "detect", {"threads": threads})
+
+    def bare() -> None:
+        for array in tensors:
+            session.run(None, {"images": array})
+
+    def stage() -> None:
+        run_stage(STAGE, config, Job(log, out, {"model": model}))
+
+    alone, whole = _seconds(bare, stage, rounds)
+    peers = {"stage images/s": len(tensors) / whole, "session.run images/s": len(tensors) / alone}
+    return Row(name, alone / whole, "x", at_least=0.9, cases=len(tensors), peers=peers)
+
+
+def _latency(folder: Path, rounds: int) -> Iterator[Row]:
+    """Milliseconds per run of each size on 640 x 640, one thread and two, beside the thesis's."""
+    image = np.random.default_rng(1).random((1, 3, 640, 640), dtype=np.float32)
+    for size in SIZES:
+        model = folder / f"{size}.onnx"
+        yolov5(model, NAMES, size, Export(objectness_bias=-5.0))
+        one, two = (partial(open_session(model, threads=threads).run, image) for threads in (1, 2))
+        alone, both = _seconds(one, two, rounds)
+        peers = {"2 threads": both * 1e3, "thesis's CPU": THESIS_CPU_MS[size]}
+        yield Row(f"latency_{size}", alone * 1e3, "ms", cases=rounds, peers=peers)
+
+
+def _seconds(first: Callable[[], object], second: Callable[[], object], rounds: int) -> tuple[float, float]:
+    """Median times of two contestants that take turns, after one round to warm up."""
+    taken: list[list[float]] = [[], []]
+    for _ in range(rounds + 1):
+        for times, run in zip(taken, (first, second), strict=True):
+            began = time.perf_counter()
+            run()
+            times.append(time.perf_counter() - began)
+    return float(np.median(taken[0][1:])), float(np.median(taken[1][1:]))
+
+
+if __name__ == "__main__":
+    sys.exit(main(measure, __doc__ or ""))
