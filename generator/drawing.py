@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from generator.assets.bullet import AssetStore, Body
 from generator.camera import Intrinsics, View
+from generator.engine import pybullet
 from generator.layout import PlacedObject
 from generator.scenario import LightSpec
 

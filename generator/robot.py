@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from generator.engine import pybullet
 from toolkit.geometry.angles import quaternion_from_yaw
 
 Floats = NDArray[np.float64]

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from typing import Self
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
 from generator.assets.bullet import AssetStore
+from generator.engine import pybullet
 from generator.layout import PlacedObject
 from generator.robot import STATIC_GROUP, Robot
 

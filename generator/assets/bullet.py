@@ -8,11 +8,11 @@ from typing import Self
 
 import cv2
 import numpy as np
-import pybullet
 from numpy.typing import ArrayLike
 
 from generator.assets.asset import Asset, Part
 from generator.assets.texture import Image
+from generator.engine import pybullet
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-import pybullet
 
 from generator.assets import catalog, ground, sky
 from generator.assets.asset import Asset
 from generator.assets.backdrop import Backdrop, cast_shadow
 from generator.assets.bullet import AssetStore
 from generator.assets.texture import Image
+from generator.engine import pybullet
 
 CELL_PX = (200, 200)
 COLUMNS = 8
