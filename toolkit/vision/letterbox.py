@@ -38,8 +38,12 @@ class Letterbox:
 def fit(image_px: tuple[int, int], input_px: tuple[int, int]) -> Letterbox:
     """The letterbox of an image (height, width) in an input (height, width), centred as YOLOv5 does."""
     (image_height, image_width), (height, width) = image_px, input_px
-    ratio = min(height / image_height, width / image_width)
-    inner_height, inner_width = (max(1, round(image_height * ratio)), max(1, round(image_width * ratio)))
+    sizes = [
+        (max(1, round(image_height * ratio)), max(1, round(image_width * ratio)))
+        for ratio in (height / image_height, width / image_width)
+    ]
+    # The larger of both fits where it only overlaps by what rounding takes off.
+    inner_height, inner_width = max(size for size in sizes if size[0] <= height and size[1] <= width)
     left, top = (width - inner_width) // 2, (height - inner_height) // 2
     return Letterbox(inner_width, inner_height, left, top, image_width, image_height)
 
