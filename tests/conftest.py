@@ -7,7 +7,6 @@ from hypothesis import settings
 
 from tests.shared import data_folder
 
-
 # The same examples on every run and machine: a red test is a change, not luck.
 settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.load_profile("fixed")
