@@ -39,8 +39,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return here
 
 
-def schema_of(verb: str) -> Any:
-    return json.loads(resource_path("schemas", f"json/{verb}.schema.json").read_text())
+def schema_of(verb: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads(resource_path("schemas", f"json/{verb}.schema.json").read_text())
+    return found
 
 
 def topics(path: Path) -> dict[str, int]:

@@ -13,9 +13,9 @@ class LogObservations:
     """T bundles that have odometry and N objects seen in them.
 
     stamps_ns, log_times_ns (T,) rise; odom_from_base (T, 3), with the way_m (T,) and turned_rad (T,) up to there.
-    Objects: `bundle` (N,) rises and says in which one each was seen, `classes` its most probable class, points_xy (N, 2) in the
-    base frame with covariances (N, 2, 2) m^2, radii_m (N,), zero where unknown. `bundles` counts those without
-    odometry too.
+    Objects: `bundle` (N,) rises and says in which one each was seen, `classes` its most probable class, points_xy
+    (N, 2) in the base frame with covariances (N, 2, 2) m^2, radii_m (N,), zero where unknown. `bundles` counts those
+    without odometry too.
     """
 
     stamps_ns: NDArray[np.int64]
