@@ -1,6 +1,6 @@
 """How fast the generator records, where the time goes, and that its memory does not grow with the log.
 
-    python -m tests.benchmark.generator [--json] [--quick]
+python -m tests.benchmark.generator [--json] [--quick]
 """
 
 import os

@@ -45,13 +45,13 @@ class ClassEvidence:
         """Likelihoods (N, C) of what was seen of N objects, were they of each class, up to a factor per object."""
         number = {name: i for i, name in enumerate(self.names)}
         seen = np.zeros((len(hypotheses), len(self.names)))
-        for row, options in zip(seen, hypotheses, strict=True):
+        for row, options in enumerate(hypotheses):
             for name, score in options:
                 if name in number:
-                    row[number[name]] += max(score, 0.0)
+                    seen[row, number[name]] += max(score, 0.0)
             total = sum(max(score, 0.0) for _, score in options)
             if total > 0:
-                row /= total
+                seen[row] /= total
         return (1 - self.misread) * seen + self.misread / len(self.names)
 
     def log_ratios(self, probabilities: Array) -> Array:
@@ -73,7 +73,7 @@ class PairDensity:
     def of(cls, places: cKDTree, positions: Array) -> "PairDensity":
         """Density around landmarks, each distance averaged over a ring; one pair more than was counted."""
         centres = positions[:: max(len(positions) // _CENTRES, 1)]
-        nearest = places.query(centres, k=[2])[0][:, 0]
+        nearest = np.asarray(places.query(centres, k=[2])[0])[:, 0]
         low = max(float(np.quantile(nearest, 0.05)), 1e-6)
         high = max(float(np.median(nearest)) * 60, 8 * low)
         steps = int(np.ceil(np.log2(high / low) * _PER_OCTAVE))
@@ -124,5 +124,3 @@ def log_tail(chi2: Array, dof: NDArray[np.int64]) -> Array:
     half_chi2 = np.maximum(chi2 / 2, half_dof)
     volume: Array = half_dof * np.log(half_chi2) - gammaln(half_dof + 1)
     return volume
-
-

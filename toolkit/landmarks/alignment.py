@@ -44,7 +44,8 @@ def _pairs(kinds: NDArray[np.int64], points_xy: Array) -> NDArray[np.int64]:
     pairs = np.concatenate([near, near[:, ::-1]]).astype(np.int64)
     length = np.linalg.norm(points_xy[pairs[:, 0]] - points_xy[pairs[:, 1]], axis=1)
     pairs = pairs[(length > _NEAR_M) & (kinds[pairs[:, 0]] <= kinds[pairs[:, 1]])]
-    return pairs[np.lexsort(pairs.T)]
+    ordered: NDArray[np.int64] = pairs[np.lexsort(pairs.T)]
+    return ordered
 
 
 def _hypotheses(
@@ -64,11 +65,11 @@ def _hypotheses(
 
     if not len(mine) or not len(theirs):
         return np.zeros((0, 3))
-    found = cKDTree(features(map_kinds, map_xy, theirs)).query_ball_point(
-        features(kinds, points, mine), _LIKE_M, return_sorted=True
-    )
+    tree = cKDTree(features(map_kinds, map_xy, theirs))
+    near = tree.query_ball_point(features(kinds, points, mine), _LIKE_M, return_sorted=True)
+    found = [np.asarray(hits, dtype=np.int64) for hits in np.asarray(near, dtype=object)]
     rows = np.repeat(np.arange(len(mine)), [len(hits) for hits in found])
-    columns = np.array([column for hits in found for column in hits], dtype=np.int64)
+    columns = np.concatenate(found)
     if len(rows) > _TRIED:
         keep = np.linspace(0, len(rows) - 1, _TRIED).astype(np.int64)
         rows, columns = rows[keep], columns[keep]
@@ -96,5 +97,6 @@ def _scores(
         there = map_xy[map_kinds == kind]
         if len(there):
             moved = transform_points(poses[:, None], points[kinds == kind])
-            scores += (cKDTree(there).query(moved, distance_upper_bound=tolerance_m)[0] < np.inf).sum(axis=1)
+            distance = np.asarray(cKDTree(there).query(moved, distance_upper_bound=tolerance_m)[0])
+            scores += np.isfinite(distance).sum(axis=1)
     return scores

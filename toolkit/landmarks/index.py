@@ -162,12 +162,14 @@ class MapIndex:
 
 def side_lengths(points: Array) -> Array:
     """Lengths (..., K) from each of K points (..., K, 2) to the next, the last to the first."""
-    return np.linalg.norm(points - np.roll(points, -1, axis=-2), axis=-1)
+    lengths: Array = np.linalg.norm(points - np.roll(points, -1, axis=-2), axis=-1)
+    return lengths
 
 
 def first_corner(classes: Ints, count: int) -> Ints:
     """Which corner of triangles (Q, 3) comes first in the index: the one from which the classes read lowest."""
-    return np.stack([_number(np.roll(classes, -r, axis=1), count) for r in range(3)], axis=1).argmin(axis=1)
+    first: Ints = np.stack([_number(np.roll(classes, -r, axis=1), count) for r in range(3)], axis=1).argmin(axis=1)
+    return first
 
 
 def _number(classes: Ints, count: int) -> Ints:
@@ -176,7 +178,7 @@ def _number(classes: Ints, count: int) -> Ints:
 
 
 def _extent(places: cKDTree, positions: Array) -> tuple[float, float]:
-    nearest = places.query(positions, k=[2])[0]
+    nearest = np.asarray(places.query(positions, k=[2])[0])
     widest = float(np.linalg.norm(np.ptp(positions, axis=0)))
     return float(nearest.min(where=nearest > 0, initial=widest)), widest
 
@@ -185,10 +187,11 @@ def _neighbours(places: cKDTree, positions: Array) -> Ints:
     """The nearest landmarks (N, K) of each, nearest first."""
     n = len(positions)
     count = min(n - 1, max(_NEAREST, int(np.sqrt(2 * _TRIANGLES / n))))
-    near: Ints = places.query(positions, k=np.arange(1, count + 2), workers=2)[1]
+    near = np.asarray(places.query(positions, k=np.arange(1, count + 2), workers=2)[1], dtype=np.int64)
     own = near == np.arange(n)[:, None]
     own[~own.any(axis=1), -1] = True  # landmarks in one place can push a landmark off its own list
-    return near[~own].reshape(n, count)
+    others: Ints = near[~own].reshape(n, count)
+    return others
 
 
 def _pairs(near: Ints, class_of: Ints) -> NDArray[np.int32]:

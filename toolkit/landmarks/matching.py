@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,8 @@ _OBJECT, _SET = 5e-4, 1e-4
 # Candidates closer than this are one place; so many places are kept.
 _SAME_M, _SAME_RAD = 0.5, 0.17
 _PLACES = 32
-# Factors between lengths in the bundle and in the map that only a wrong unit explains.
-_UNIT = 100.0
+# No sensor sees an object farther away, and no map has its landmarks farther apart: beyond, the unit is wrong.
+_FARTHEST_M, _SPARSEST_M = 500.0, 200.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +101,9 @@ class Matcher:
             return
         apart = np.linalg.norm(points[:, None] - points, axis=-1)[np.triu_indices(len(points), 1)]
         nearest, widest = self.index.extent_m
-        if apart.min() > _UNIT * widest or apart.max() * _UNIT < nearest:
+        far_objects = apart.min() > widest and np.median(np.linalg.norm(points, axis=1)) > _FARTHEST_M
+        far_landmarks = apart.max() < nearest and nearest > _SPARSEST_M
+        if far_objects or far_landmarks:
             raise MapError(
                 f"objects of one bundle lie {apart.min():.3g} to {apart.max():.3g} m apart, landmarks of the map "
                 f"{nearest:.3g} to {widest:.3g} m; one of them is not in metres, so convert it"
@@ -130,7 +133,7 @@ class Matcher:
         fits = fits.pick(possible & (fits.dof > 0) & np.isfinite(fits.log_ratio))
         fits = fits.pick(np.lexsort((-fits.log_ratio, fits.candidates.of)))
         bounds = np.searchsorted(fits.candidates.of, np.arange(len(sets) + 1))
-        return [_places(fits, int(a), int(b), tests) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+        return [_places(fits, int(a), int(b), tests) for a, b in pairwise(bounds)]
 
     def match(self, scenes: Sequence[SceneObjects]) -> list[Match]:
         """Match each scene by itself.

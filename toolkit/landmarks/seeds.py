@@ -79,7 +79,7 @@ class Finder:
         return self._candidates(sets, queries, hits.query, hits.landmarks, found**2 / variance[hits.query])
 
     def _classes(self, sets: Constellations, of: Ints, objects: Ints) -> _Queries:
-        """Groups of objects (Q, S) wide enough to tell the heading, with the likeliest class of each or with one other."""
+        """Groups of objects (Q, S) wide enough to tell the heading, with the likeliest class of each or one other."""
         wide = self._heading_sigma(sets, of, objects) < _HEADING_RAD
         of, objects = of[wide], objects[wide]
         first = sets.log_ratio.argmax(axis=2)
@@ -113,11 +113,11 @@ class Finder:
         place = np.arange(size)
         jacobian[:, place, place] = -along
         jacobian[:, place, (place + 1) % size] += along
-        jacobian = jacobian.reshape(len(points), size, 2 * size)
+        by_point: Array = jacobian.reshape(len(points), size, 2 * size)
         columns = (2 * queries.objects[..., None] + np.arange(2)).reshape(len(points), 2 * size)
         spread = sets.covariance[queries.of[:, None, None], columns[:, :, None], columns[:, None, :]]
         spread = spread + self.map_sigma_m**2 * np.eye(2 * size)
-        return sides, jacobian @ spread @ jacobian.swapaxes(1, 2)
+        return sides, by_point @ spread @ by_point.swapaxes(1, 2)
 
     def _oriented(self, sets: Constellations, queries: _Queries) -> tuple[_Queries, Array, Array]:
         """Triangles counter-clockwise; those too flat to tell also the other way round."""

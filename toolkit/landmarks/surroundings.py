@@ -12,6 +12,8 @@ Ints = NDArray[np.int64]
 # Objects remembered, and the share of an object's variance that is the same at every sighting.
 _MOST = 24
 _SYSTEMATIC = 0.5
+# What was seen once, and not in some more bundles over some way, was no object.
+_STRAY_BUNDLES, _STRAY_M = 2, 2.0
 _TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
@@ -71,7 +73,8 @@ class Surroundings:
         # Where more than one landmark would fit by chance, an object has nothing left to say.
         own = self._own()
         crowd = 2 * np.pi * np.sqrt(np.maximum(np.linalg.det(own), 0)) * np.exp(self._density.log_density[-1])
-        self._keep((self._seen_at_m > self._way_m - self._length_m) & (crowd < 1))
+        stray = (self._sightings < 2) & (self._last_bundle < self._bundles - _STRAY_BUNDLES) & (self.age_m > _STRAY_M)
+        self._keep((self.age_m < self._length_m) & (crowd < 1) & ~stray)
 
     def see(self, points_xy: Array, covariances: Array, probabilities: Array) -> Ints:
         """Take in one bundle: points (K, 2), covariances (K, 2, 2), class likelihoods (K, C).
@@ -85,11 +88,12 @@ class Surroundings:
         while (todo := np.flatnonzero(numbers < 0)).size and free.any():
             same = self._same(points_xy[todo], covariances[todo], probabilities[todo])
             same[:, ~free] = -np.inf
-            row, track = divmod(int(np.argmax(same)), len(self))
-            if same[row, track] < 0:
+            place, track = divmod(int(np.argmax(same)), len(self))
+            if same[place, track] < 0:
                 break
-            self._update(track, points_xy[todo[row]], covariances[todo[row]], probabilities[todo[row]])
-            numbers[todo[row]] = self.numbers[track]
+            known = int(todo[place])
+            self._update(track, points_xy[known], covariances[known], probabilities[known])
+            numbers[known] = self.numbers[track]
             free[track] = False
         for row in np.flatnonzero(numbers < 0):
             numbers[row] = self._add(points_xy[row], covariances[row], probabilities[row])

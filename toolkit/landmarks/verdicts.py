@@ -24,9 +24,14 @@ class Limits(Protocol):
     """What is accepted: so many accidental matches to expect, so large a standard deviation of the position."""
 
     @property
-    def accidental(self) -> float: ...
+    def accidental(self) -> float:
+        """The most accidental matches to expect of a match that is accepted."""
+        ...
+
     @property
-    def max_sigma_m(self) -> float: ...
+    def max_sigma_m(self) -> float:
+        """The largest standard deviation of a position that is accepted."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +79,7 @@ def refused(scene: SceneObjects, index: MapIndex, places: Places | None, joined:
         status = Status.TOO_FEW_OBJECTS
     elif places is None or logsumexp(places.fits.log_ratio) < 0:
         status = Status.NO_MATCH
-    shown = [] if places is None else places.fits.candidates.landmarks[:_LISTED]
+    shown = np.zeros((0, 0), dtype=np.int64) if places is None else places.fits.candidates.landmarks[:_LISTED]
     message = LandmarkMatch(
         scene.stamp_ns,
         scene.frame_id,

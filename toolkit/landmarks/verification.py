@@ -49,7 +49,7 @@ class Candidates(NamedTuple):
 
     def pick(self, rows: Bools | Ints) -> "Candidates":
         """Some of them."""
-        return Candidates(*(a[rows] for a in self))
+        return Candidates(self.of[rows], self.pose[rows], self.landmarks[rows])
 
 
 class Prior(NamedTuple):
@@ -80,7 +80,14 @@ class Fits(NamedTuple):
 
     def pick(self, rows: Bools | Ints) -> "Fits":
         """Some of them."""
-        return Fits(self.candidates.pick(rows), *(a[rows] for a in self[1:]))
+        return Fits(
+            self.candidates.pick(rows),
+            self.covariance[rows],
+            self.chi2[rows],
+            self.dof[rows],
+            self.log_ratio[rows],
+            self.log_accidental[rows],
+        )
 
 
 class Solved(NamedTuple):
@@ -151,7 +158,7 @@ class Verifier:
             spread[:, 2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += own[:, i]
         both = np.repeat(used, 2, axis=1)
         spread = np.where(both[:, :, None] & both[:, None, :], spread, np.eye(2 * k))
-        weight = np.linalg.inv(spread)
+        weight: Array = np.linalg.inv(spread).astype(np.float64)
         points, places = sets.points_xy[of], self.index.positions_xy[landmarks]
         for step in range(_STEPS + 1):
             expected = se2.transform_points(se2.inverse(pose)[:, None], places)
@@ -206,8 +213,8 @@ class Verifier:
 
     def _near(self, places: Array) -> Ints:
         """Nearest landmarks (..., H) of places (..., 2)."""
-        near: Ints = self.index.places.query(places, k=np.arange(1, min(_NEAR, len(self.index)) + 1))[1]
-        return near
+        count = min(_NEAR, len(self.index))
+        return np.asarray(self.index.places.query(places, k=np.arange(1, count + 1))[1], dtype=np.int64)
 
     def _without_worst(self, _sets: Constellations, solved: Solved) -> Ints:
         """Landmarks (M, K) without the object that the others of its candidate, or what was known, least agree with."""

@@ -1,0 +1,106 @@
+"""The stage localize: repeated classes, the thesis's method, and what is written."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+
+from tests.stages.worlds import circle, drive, ring
+from toolkit.channels import MAP, MATCH, POSE, POSE_COVARIANCE, TF
+from toolkit.landmarks.database import write_map
+from toolkit.landmarks.exchange_thesis import parse_map
+from toolkit.landmarks.model import LandmarkMap, Source
+from toolkit.messages.match import Status
+from toolkit.stage import Stamped
+from toolkit.stages.localize import LocalizeConfig, process
+
+APPENDIX_C = Path(__file__).resolve().parents[1] / "data" / "thesis_appendix_c.txt"
+
+
+def localized(folder: Path, config: LocalizeConfig, *, unique: bool = False, seed: int = 1) -> list[Stamped]:
+    classes, positions = ring()
+    if unique:
+        classes = tuple(f"tag {i}" for i in range(len(positions)))
+    names = tuple(f"l{i}" for i in range(len(classes)))
+    database = folder / "map.db"
+    write_map(database, LandmarkMap.surveyed(names, classes, positions, Source("import", "test")))
+    return list(process(drive(circle(), classes, positions, seed), config, {"map": database}))
+
+
+def errors_m(found: list[Stamped]) -> np.ndarray:
+    truth = circle()
+    poses = [stamped for stamped in found if stamped.channel == POSE]
+    rows = [(stamped.log_time_ns - 1) // 500_000_000 for stamped in poses]
+    estimate = np.array([stamped.message.pose[:2] for stamped in poses])
+    return np.linalg.norm(estimate - truth[rows, :2], axis=1)
+
+
+def statuses(found: list[Stamped]) -> list[Status]:
+    return [stamped.message.status for stamped in found if stamped.channel == MATCH]
+
+
+def test_repeated_classes_are_followed(tmp_path: Path) -> None:
+    found = localized(tmp_path, LocalizeConfig())
+    assert sum(stamped.channel == MAP for stamped in found) == 1
+    assert len(statuses(found)) == len(circle())
+    assert statuses(found).count(Status.LOCALIZED) > 0.8 * len(circle())
+    assert errors_m(found).max() < 0.5
+    counts = {channel: sum(stamped.channel == channel for stamped in found) for channel in (POSE, POSE_COVARIANCE, TF)}
+    assert len(set(counts.values())) == 1
+
+
+def test_single_bundles_refuse_more_and_are_right(tmp_path: Path) -> None:
+    alone = localized(tmp_path, LocalizeConfig(join_m=0.0))
+    joined = localized(tmp_path, LocalizeConfig())
+    assert statuses(alone).count(Status.LOCALIZED) <= statuses(joined).count(Status.LOCALIZED)
+    if any(stamped.channel == POSE for stamped in alone):
+        assert errors_m(alone).max() < 1.0
+
+
+def test_unique_classes_need_no_joining(tmp_path: Path) -> None:
+    found = localized(tmp_path, LocalizeConfig(), unique=True)
+    assert errors_m(found).max() < 0.3
+    refused = [status for status in statuses(found) if status != Status.LOCALIZED]
+    assert set(refused) <= {Status.TOO_FEW_OBJECTS, Status.WEAK_GEOMETRY}
+
+
+def test_limits_make_weak_geometry(tmp_path: Path) -> None:
+    for config in (LocalizeConfig(max_sigma_m=1e-6), LocalizeConfig(max_sigma_deg=1e-6)):
+        for unique in (True, False):
+            found = localized(tmp_path, config, unique=unique)
+            assert Status.WEAK_GEOMETRY in statuses(found)
+            assert not any(stamped.channel in {POSE, POSE_COVARIANCE, TF} for stamped in found)
+
+
+def test_no_transform_where_none_is_wanted(tmp_path: Path) -> None:
+    found = localized(tmp_path, LocalizeConfig(tf="never"), unique=True)
+    assert not any(stamped.channel == TF for stamped in found)
+
+
+def test_the_thesis_method_gives_positions_without_heading(tmp_path: Path) -> None:
+    landmark_map = parse_map(APPENDIX_C.read_text(), APPENDIX_C.name)
+    group = landmark_map.groups[0]
+    rows = [landmark_map.ids.index(name) for name in group.landmark_ids]
+    pose = group.map_from_base
+    classes = tuple(landmark_map.classes[row] for row in rows)
+    near = landmark_map.positions_xy[rows] - landmark_map.positions_xy[rows].mean(axis=0)
+    # brought within the drive's view of 7 m, the group keeps its shape; the map is written to match
+    middle = pose[:2] + 4.0 * np.array([np.cos(pose[2]), np.sin(pose[2])])
+    moved = landmark_map.positions_xy.copy()
+    moved[rows] = middle + near
+    shifted = dataclasses.replace(landmark_map, positions_xy=moved)
+    write_map(tmp_path / "map.db", shifted)
+    poses = np.tile(pose, (5, 1)) + np.linspace(0, 0.01, 5)[:, None] * [1, 0, 0]
+    config = LocalizeConfig(method="thesis", thesis_guess_m=(float(pose[0]), float(pose[1])))
+    found = list(process(drive(poses, classes, moved[rows], seed=3), config, {"map": tmp_path / "map.db"}))
+    assert statuses(found) == [Status.LOCALIZED] * 5
+    for stamped in found:
+        if stamped.channel == POSE:
+            np.testing.assert_allclose(stamped.message.position_m[:2], pose[:2], atol=0.3)
+            np.testing.assert_array_equal(stamped.message.orientation_xyzw, 0)
+    assert not any(stamped.channel == POSE_COVARIANCE for stamped in found)
+
+
+def test_the_thesis_method_needs_three_known_objects(tmp_path: Path) -> None:
+    found = localized(tmp_path, LocalizeConfig(method="thesis"), unique=True)
+    assert set(statuses(found)) <= {Status.TOO_FEW_OBJECTS, Status.NO_MATCH}
