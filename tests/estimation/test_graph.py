@@ -10,7 +10,7 @@ from tests.estimation.worlds import Array
 from toolkit.errors import MapError
 from toolkit.estimation.graph import KnownLandmarks, MapSolution, solve_map
 from toolkit.estimation.graph_join import align
-from toolkit.estimation.odometry import Motions, OdometryNoise, dead_reckoning, motion_covariance, motions_between
+from toolkit.estimation.odometry import Motions, OdometryNoise, dead_reckoning, motion_covariance
 from toolkit.estimation.support import confirmed
 from toolkit.geometry import se2
 
@@ -162,13 +162,3 @@ def test_odometry_errs_across_its_chord_as_a_random_walk_does() -> None:
     whole = Motions(np.array([[1.0, 0, 0]]), np.ones(1), np.zeros(1))
     expected = motion_covariance(whole, OdometryNoise(0.0, 0.05, 0.0))[0]
     np.testing.assert_allclose(np.cov(np.array(ends).T), expected, atol=1.5e-4)
-
-
-def test_motions_between_bundles_know_the_way_taken() -> None:
-    time_ns = np.arange(0, 10_000_000_001, 100_000_000)
-    angle = np.linspace(0, 2 * np.pi, 101)
-    circle = np.stack([np.sin(angle), 1 - np.cos(angle), angle], axis=-1)
-    motions = motions_between(time_ns, circle, np.array([0, 50_000_000, 10_000_000_000]))
-    np.testing.assert_allclose(motions.relative.sum(axis=0)[2], 0, atol=1e-9)
-    np.testing.assert_allclose(motions.turn_rad, [np.pi / 100, 2 * np.pi * 0.995], rtol=1e-9)
-    np.testing.assert_allclose(motions.distance_m.sum(), 2 * np.pi, rtol=1e-3)

@@ -80,3 +80,13 @@ def test_odometry_that_goes_backwards_or_is_not_finite_is_counted() -> None:
 def test_bundles_keep_their_order(gap: int) -> None:
     found, _ = bundles(*[(i * gap, scene(i * gap + 1)) for i in range(50)])
     assert [bundle.stamp_ns for bundle in found] == [i * gap + 1 for i in range(50)]
+
+
+def test_a_loop_back_to_the_start_still_counts_as_way() -> None:
+    corners = [(0, 0, 0), (1, 0, np.pi / 2), (1, 1, np.pi), (0, 1, -np.pi / 2), (0, 0, 0)]
+    trail = [(i, odometry(i * SECOND + 1, *pose)) for i, pose in enumerate(corners)]
+    found, _ = bundles(*trail, (9, scene(4 * SECOND + 1)))
+    at = found[0].odometry
+    assert at is not None
+    np.testing.assert_allclose(at.odom_from_base, 0, atol=1e-12)
+    np.testing.assert_allclose([at.way_m, at.turned_rad], [4.0, 2 * np.pi], atol=1e-9)

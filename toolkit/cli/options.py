@@ -21,12 +21,10 @@ MaybeOutput = Annotated[
 ]
 MapFile = Annotated[Path, typer.Option("--map", help="Landmark database (SQLite file).")]
 ResultsOnly = Annotated[bool, typer.Option("--results-only", help="Write the new channels without the input's.")]
-Force = Annotated[bool, typer.Option("--force", help="Recompute everything and replace existing output files.")]
 Start = Annotated[str | None, typer.Option("--start", help="First log time: RFC 3339 or integer nanoseconds.")]
 End = Annotated[str | None, typer.Option("--end", help="Log time to stop before: RFC 3339 or integer nanoseconds.")]
 Remap = Annotated[list[str] | None, typer.Option("--remap", metavar="FROM=TO", help="Read topic FROM as TO.")]
 OdometryTopic = Annotated[str | None, typer.Option("--odom", help="Odometry topic, where the log has several.")]
-ScanTopic = Annotated[str | None, typer.Option("--scan", help="LaserScan topic, where the log has several.")]
 ImageTopic = Annotated[str | None, typer.Option("--image", help="Image topic, where the log has several.")]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="TOML file with one table per stage.")]
 Settings = Annotated[

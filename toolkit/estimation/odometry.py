@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.geometry import se2
 from toolkit.geometry.angles import wrap
 
 Array = NDArray[np.float64]
@@ -35,25 +34,6 @@ class Motions:
     relative: Array
     distance_m: Array
     turn_rad: Array
-
-
-def motions_between(time_ns: NDArray[np.int64], odom_from_base: Array, at_ns: NDArray[np.int64]) -> Motions:
-    """Motions between the times `at_ns` (N,) of odometry poses (T, 3) at `time_ns` (T,), both rising strictly.
-
-    Way and turning are summed over every odometry pose on the way, so a loop back to the start still counts. The asked
-    times must lie within the odometry's.
-    """
-    step = se2.between(odom_from_base[:-1], odom_from_base[1:])
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))])
-    turned = np.concatenate([[0.0], np.cumsum(np.abs(step[:, 2]))])
-    since = (time_ns - time_ns[0]).astype(np.float64)
-    asked = (at_ns - time_ns[0]).astype(np.float64)
-    poses = se2.interpolate(time_ns, odom_from_base, at_ns)
-    return Motions(
-        se2.between(poses[:-1], poses[1:]),
-        np.diff(np.interp(asked, since, way)),
-        np.diff(np.interp(asked, since, turned)),
-    )
 
 
 def motion_covariance(motions: Motions, noise: OdometryNoise) -> Array:
