@@ -1,6 +1,6 @@
 """Small logs of scene objects, odometry and truth for the verbs to chew on."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -15,15 +15,16 @@ from toolkit.stage import Stamped
 Change = Callable[[list[Stamped]], list[Stamped]]
 
 
-def messages(seed: int = 1, count: int = 120) -> list[Stamped]:
-    """A lap through the ring; every object has a class of its own."""
+def messages(seed: int = 1, count: int = 120, renamed: Mapping[str, str] | None = None) -> list[Stamped]:
+    """A lap through the ring; every object has a class of its own, unless it is `renamed`."""
     _, positions = ring()
-    classes = tuple(f"tag {i}" for i in range(len(positions)))
+    ids = tuple(f"tag {i}" for i in range(len(positions)))
+    classes = tuple((renamed or {}).get(name, name) for name in ids)
     poses, rng = circle(1.05, count=count), np.random.default_rng(seed)
     odometry = drifting(poses, rng)
     n = len(classes)
     truth = SceneObjects(
-        1, "map", classes, tuple(((c, 1.0),) for c in classes), positions, np.zeros((n, 2, 2)), np.zeros(n)
+        1, "map", ids, tuple(((c, 1.0),) for c in classes), positions, np.zeros((n, 2, 2)), np.zeros(n)
     )
     found = [Stamped(TRUTH_OBJECTS, 1, truth)]
     for i, pose in enumerate(poses):

@@ -1,13 +1,12 @@
 """Show what logs hold and which verbs can use them."""
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from toolkit.cli import options
-from toolkit.cli.console import PARTIAL, say, say_json, table, warn
+from toolkit.cli.console import PARTIAL, moment, say, say_json, table, warn
 
 if TYPE_CHECKING:
     from toolkit.runs.info import LogInfo
@@ -68,7 +67,7 @@ def _print(log: "LogInfo", *, several: bool) -> None:
         say(f"{kind}no messages")
     else:
         duration = (log.end_ns - log.start_ns) * 1e-9
-        say(f"{kind}{_moment(log.start_ns)} to {_moment(log.end_ns)}, {duration:.3f} s, {count} messages")
+        say(f"{kind}{moment(log.start_ns)} to {moment(log.end_ns)}, {duration:.3f} s, {count} messages")
     rows = [
         [
             channel.topic,
@@ -84,13 +83,3 @@ def _print(log: "LogInfo", *, several: bool) -> None:
         say(f"ready for: {', '.join(log.verbs)}")
     for verb, roles in log.missing.items():
         say(f"{verb} lacks: {', '.join(roles)}")
-
-
-def _moment(time_ns: int) -> str:
-    """RFC 3339 to the nanosecond, as --start and --end take it; a number where the calendar ends."""
-    seconds, rest = divmod(time_ns, 10**9)
-    try:
-        moment = datetime.fromtimestamp(seconds, UTC)
-    except (OverflowError, ValueError, OSError):
-        return str(time_ns)
-    return f"{moment:%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"

@@ -1,22 +1,30 @@
 """Localize logs in a landmark map."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from toolkit.cli import options
-from toolkit.cli.console import say, table
-from toolkit.cli.stage_runs import finish, run_over
+from toolkit.cli.console import PARTIAL, moment, progress, say, say_json, table, warn
+from toolkit.cli.stage_runs import Configured, finish, run_over
+from toolkit.errors import UsageError
 
 if TYPE_CHECKING:
+    from toolkit.runs.bundles import Reading, Span
+    from toolkit.runs.moment import Answer
     from toolkit.runs.pipeline import StageRun
 
 
 def command(
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP).")],
     map_file: options.MapFile,
-    output: options.Output,
+    output: options.MaybeOutput = None,
+    at: Annotated[
+        str | None,
+        typer.Option("--at", help="Answer for this moment only, and write nothing: RFC 3339 or nanoseconds."),
+    ] = None,
     config_file: options.ConfigFile = None,
     settings: options.Settings = None,
     method: options.Method = None,
@@ -30,6 +38,14 @@ def command(
     """Localize every bundle of scene objects in LOG... in a landmark map; write the input with pose and match."""
     span = options.span(start, end, remap, {"odometry": odom})
     configured = config_file, settings, method
+    asked_ns = options.time_ns(at, "--at")
+    if asked_ns is not None:
+        if output is not None or len(logs) > 1:
+            raise UsageError("--at prints one answer for one log: leave -o out, and name a single log")
+        _at(logs[0], map_file, asked_ns, configured, span, json)
+        return
+    if output is None:
+        raise UsageError("localize needs -o FILE to write to, or --at TIME for one answer")
     finish(
         "localize",
         run_over("localize", logs, output, configured, {"map": map_file}, span, results_only),
@@ -59,3 +75,73 @@ def _print(runs: "list[StageRun]") -> None:
     for run in runs:
         share = run.counts["localized"] / max(run.reading.association.bundles, 1)
         say(f"{run.output}: {run.counts['localized']} bundles localized ({100 * share:.1f} %)")
+
+
+def _at(log: Path, map_file: Path, asked_ns: int, configured: Configured, span: "Span", json: bool) -> None:
+    from toolkit.runs.config import gather, load_files
+    from toolkit.runs.moment import localize_at
+    from toolkit.stage import Stage
+    from toolkit.stages import find_stage
+
+    stage = find_stage("localize")
+    assert isinstance(stage, Stage)  # noqa: S101 - build_map is the one reduction
+    config_file, settings, method = configured
+    config, files = load_files(stage, gather(config_file, settings or [], method), {"map": map_file})
+    with progress(f"localize {log.name}", log.stat().st_size if log.is_file() else None) as advance:
+        answer, reading = localize_at(stage, config, files, log, span, asked_ns, advance)
+    for loss in reading.losses:
+        warn(f"warning: {log}: {loss}")
+    if json:
+        say_json("localize", _moment_document(log, asked_ns, answer, reading))
+    else:
+        _print_moment(log, asked_ns, answer)
+    if reading.losses:
+        raise typer.Exit(PARTIAL)
+
+
+def _moment_document(log: Path, asked_ns: int, answer: "Answer", reading: "Reading") -> dict[str, object]:
+    match, pose, covariance = answer.match, answer.pose, answer.covariance
+    sigma_m, heading_sigma_rad = _sigmas(answer)
+    return {
+        "log": str(log),
+        "asked_ns": asked_ns,
+        "stamp_ns": answer.stamp_ns,
+        "status": match.status.name.lower(),
+        "position_m": None if pose is None else pose[:2].tolist(),
+        "heading_rad": None if pose is None or covariance is None else float(pose[2]),
+        "sigma_m": sigma_m,
+        "heading_sigma_rad": heading_sigma_rad,
+        "covariance": None if covariance is None else covariance.tolist(),
+        "landmarks": dict(zip(match.object_ids, match.landmark_ids, strict=True)),
+        "candidates": dict(zip(match.candidate_ids, match.candidate_scores.tolist(), strict=True)),
+        "expected_accidental": match.expected_accidental,
+        "chi2": match.chi2,
+        "dof": match.dof,
+        "bundles_joined": match.bundles_joined,
+        "dropped": reading.notes(),
+        "losses": reading.losses,
+    }
+
+
+def _sigmas(answer: "Answer") -> tuple[float | None, float | None]:
+    """Largest standard deviation of the position in any direction, and that of the heading."""
+    from toolkit.estimation.pose import position_sigma
+
+    if answer.covariance is None:
+        return None, None
+    return float(position_sigma(answer.covariance)), math.sqrt(answer.covariance[2, 2])
+
+
+def _print_moment(log: Path, asked_ns: int, answer: "Answer") -> None:
+    match, pose = answer.match, answer.pose
+    late_s = (answer.stamp_ns - asked_ns) / 1e9
+    say(f"{log} at {moment(answer.stamp_ns)} ({late_s:+.3f} s): {match.status.name.lower()}")
+    if pose is not None:
+        say(f"position {pose[0]:.3f}, {pose[1]:.3f} m")
+    sigma_m, heading_sigma_rad = _sigmas(answer)
+    if pose is not None and sigma_m is not None and heading_sigma_rad is not None:
+        say(f"heading {math.degrees(pose[2]):.2f} deg")
+        say(f"sigma {sigma_m:.3f} m, {math.degrees(heading_sigma_rad):.2f} deg")
+    say(f"{match.bundles_joined} bundles joined, {match.expected_accidental:.2g} accidental matches expected")
+    for name, score in zip(match.candidate_ids, match.candidate_scores.tolist(), strict=True):
+        say(f"candidate {name}: {score:.3g}")

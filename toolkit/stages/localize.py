@@ -32,7 +32,8 @@ from toolkit.stages._localize_joined import JoinedLocator
 from toolkit.stages._localize_thesis import locate_as_in_the_thesis
 from toolkit.stages._localize_unique import UniqueLocator
 
-_BATCH = 4096
+# Bundles that are solved together, or calibrated from; what follows the robot takes them one by one.
+_BATCH, _FOLLOWED = 4096, 64
 
 Locate = Callable[[Sequence[SceneObjects], Sequence[OdometryAt | None]], list[Match]]
 
@@ -78,9 +79,9 @@ class LocalizeConfig:
 def process(bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Path]) -> Iterator[Stamped]:
     """Match and pose of every bundle, the map once before the first."""
     landmark_map = read_map(resources["map"])
-    locate = _method(landmark_map, config)
+    locate, size = _method(landmark_map, config)
     stream, first = iter(bundles), True
-    while batch := list(islice(stream, _BATCH)):
+    while batch := list(islice(stream, size)):
         if first:
             yield Stamped(MAP, batch[0].log_time_ns, scene_from_map(landmark_map, batch[0].stamp_ns))
             first = False
@@ -89,14 +90,14 @@ def process(bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mappin
             yield from _messages(bundle, match, landmark_map.frame, config)
 
 
-def _method(landmark_map: LandmarkMap, config: LocalizeConfig) -> Locate:
-    """The way to localize that the configuration and the map's classes ask for."""
+def _method(landmark_map: LandmarkMap, config: LocalizeConfig) -> tuple[Locate, int]:
+    """The way to localize that the configuration and the map's classes ask for, and how many bundles at once."""
     if config.method == "thesis":
-        return lambda scenes, _odometry: locate_as_in_the_thesis(scenes, landmark_map, config)
+        return lambda scenes, _odometry: locate_as_in_the_thesis(scenes, landmark_map, config), _BATCH
     if len(unique_classes(landmark_map)) == np.count_nonzero(~landmark_map.tentative):
         unique = UniqueLocator(landmark_map, config)
-        return lambda scenes, _odometry: unique.locate(scenes)
-    return JoinedLocator(landmark_map, config).locate
+        return lambda scenes, _odometry: unique.locate(scenes), _BATCH
+    return JoinedLocator(landmark_map, config).locate, _FOLLOWED if config.join_m > 0 else _BATCH
 
 
 def _messages(bundle: Bundle, match: Match, frame: str, config: LocalizeConfig) -> Iterator[Stamped]:
