@@ -7,6 +7,7 @@ from toolkit.messages.markers import MarkerArray
 from toolkit.messages.match import LandmarkMatch
 from toolkit.messages.poses import Odometry, Path, PoseStamped, PoseWithCovarianceStamped
 from toolkit.messages.scan import LaserScan
+from toolkit.messages.scan_objects import ScanObjects
 from toolkit.messages.scene import SceneObjects
 from toolkit.messages.transforms import TFMessage
 from toolkit.stage import Channel
@@ -14,12 +15,15 @@ from toolkit.stage import Channel
 CAMERA_IMAGE = Channel("/camera/image_raw/compressed", CompressedImage)
 CAMERA_INFO = Channel("/camera/camera_info", CameraInfo)
 SCAN = Channel("/scan", LaserScan)
+SECOND_SCAN = Channel("/scan_2", LaserScan)
 ODOMETRY = Channel("/odom", Odometry)
 TF = Channel("/tf", TFMessage)
 TF_STATIC = Channel("/tf_static", TFMessage)
 
 DETECTIONS = Channel("/landmarks/detections", Detections)
 ANNOTATIONS = Channel("/camera/annotations", ImageAnnotations)
+SCAN_OBJECTS = Channel("/landmarks/scan_objects", ScanObjects)
+SCAN_FILTERED = Channel("/landmarks/scan_filtered", LaserScan)
 SCENE_OBJECTS = Channel("/landmarks/scene_objects", SceneObjects)
 
 MAP_MARKERS = Channel("/landmarks/map_markers", MarkerArray)

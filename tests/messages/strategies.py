@@ -12,6 +12,7 @@ from toolkit.messages.match import LandmarkMatch, Status
 from toolkit.messages.numbers import UInt8
 from toolkit.messages.poses import Odometry, Path, PoseStamped, PoseWithCovarianceStamped
 from toolkit.messages.scan import LaserScan
+from toolkit.messages.scan_objects import ScanObjects
 from toolkit.messages.scene import SceneObjects
 from toolkit.messages.transforms import TFMessage, Transform
 
@@ -40,6 +41,15 @@ def scene_objects(draw: st.DrawFn) -> SceneObjects:
     ids = draw(st.lists(text, min_size=n, max_size=n).map(tuple))
     radii = draw(vector(n, elements=st.floats(0, 100)))
     return SceneObjects(draw(stamp), draw(text), ids, classes, draw(vector(n, 2)), draw(vector(n, 2, 2)), radii)
+
+
+@st.composite
+def scan_objects(draw: st.DrawFn) -> ScanObjects:
+    classes = draw(st.lists(hypotheses, max_size=4).map(tuple))
+    ids = draw(st.lists(text, min_size=len(classes), max_size=len(classes)).map(tuple))
+    points = tuple(draw(vector(len(options), 2)) for options in classes)
+    spreads = tuple(draw(vector(len(options), 2, 2)) for options in classes)
+    return ScanObjects(draw(stamp), draw(text), ids, classes, points, spreads, draw(vector(len(classes))))
 
 
 @st.composite
@@ -101,6 +111,7 @@ MESSAGES = st.one_of(
         vector(3, 4),
     ),
     scene_objects(),
+    scan_objects(),
     detections(),
     annotations(),
     st.builds(MarkerArray, stamp, text, st.lists(marker, min_size=1, max_size=3).map(tuple)),
