@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, NamedTuple
 
+import numpy as np
+
 from toolkit.geometry.se2 import Array
 from toolkit.messages.codec import M, Message
 
@@ -66,6 +68,7 @@ class OdometryAt:
 
     The covariance is that of the message before; all zero where the log leaves it unknown. `way_m` and `turned_rad` are
     the length of the path and the sum of all turning since the log began, so that a loop back to the start counts.
+    `velocity` (3,) is the base's own: forward and left in m/s and turning in rad/s, over the two messages around.
     """
 
     frame_id: str
@@ -73,6 +76,7 @@ class OdometryAt:
     covariance: Array
     way_m: float
     turned_rad: float
+    velocity: Array = field(default_factory=lambda: np.zeros(3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

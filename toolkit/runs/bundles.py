@@ -5,15 +5,20 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from toolkit.channels import ODOMETRY
+from toolkit.channels import CAMERA_INFO, ODOMETRY, TF_STATIC
 from toolkit.errors import MessageError, RecordingError
 from toolkit.landmarks.sightings import usable
 from toolkit.messages.codec import Message, decode
 from toolkit.messages.scene import SceneObjects
+from toolkit.messages.transforms import TFMessage
 from toolkit.recording.association import Association, associate
 from toolkit.recording.reader import Recording
+from toolkit.recording.trail import odometry_from
 from toolkit.runs.inputs import ROLES, Choice, choose, message_type
 from toolkit.stage import Bundle, Channel, Connection, RawMessage
+
+HELD = (CAMERA_INFO, TF_STATIC)
+"""Channels of which a bundle gets the latest message so far, however old."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +61,10 @@ class Reading:
         found["bundles without odometry at their time"] += association.without_odometry
         found["odometry messages whose time goes backwards"] += association.odometry_out_of_order
         found["odometry messages with numbers that are not finite"] += association.odometry_not_finite
+        for topic, count in association.alone.items():
+            found[f"bundles without {topic} at their time"] += count
+        for topic, count in association.unpaired.items():
+            found[f"messages of {topic} that were nearest to no bundle"] += count
         return {reason: count for reason, count in sorted(found.items()) if count}
 
 
@@ -73,16 +82,23 @@ def inputs_of(
     needed = set(required)
     for channel in reads:
         connections = choose(recording, channel, choice)
-        found.update(dict.fromkeys(connections, channel))
+        for connection in connections:
+            found.setdefault(connection, channel)
         if channel in needed and not sum(counts[connection] for connection in connections):
             raise RecordingError(_missing(recording, channel, bool(connections)))
     return found
 
 
 def _missing(recording: Recording, channel: Channel[Any], empty: bool) -> str:
-    role = ROLES[channel]
+    role = ROLES.get(channel)
     if empty:
-        return f"{recording.path}: the {role.name} topic has no messages; record it, or choose another log"
+        name = role.name if role else channel.topic
+        return f"{recording.path}: the {name} topic has no messages; record it, or choose another log"
+    if role is None:
+        return (
+            f"{recording.path}: there is no {channel.topic}; run the stage that writes it first, or read another topic "
+            f"as it with --remap TOPIC={channel.topic}"
+        )
     kinds = " or ".join(role.types)
     return (
         f"{recording.path}: there is no {role.name} ({kinds}); choose a topic with {role.option}, or take "
@@ -98,12 +114,30 @@ def read_bundles(
 ) -> Iterator[Bundle]:
     """The bundles of messages by log time, one per message of the first channel of `reads`.
 
-    They wait for odometry if `reads` has it. `reading` is kept up to date.
+    They wait for odometry if `reads` has it, for transforms and camera information if the recording has any, and get
+    of every other channel of `reads` the message nearest in time. `reading` is kept up to date.
 
     A message that cannot be decoded is a loss, an unusable object is dropped; both are counted.
     """
-    decoded = _decoded(raws, inputs, reading)
-    return associate(decoded, reads[0], reading.association, with_odometry=ODOMETRY in reads)
+    present = {*inputs.values()} | {TF_STATIC for entry in inputs if entry.message_type == TFMessage.ROS_TYPE}
+    others = [channel for channel in reads[1:] if channel != ODOMETRY and channel in present]
+    return associate(
+        _decoded(raws, inputs, reading),
+        reads[0],
+        reading.association,
+        with_odometry=ODOMETRY in reads,
+        held=[channel for channel in others if channel in HELD],
+        beside=[channel for channel in others if channel not in HELD],
+    )
+
+
+def held_before(
+    recording: Recording, inputs: Mapping[Connection, Channel[Any]], start_ns: int | None
+) -> Iterator[RawMessage]:
+    """Messages of held inputs from before the time that reading starts at: transforms most often come only once."""
+    held = [connection for connection, channel in inputs.items() if channel in HELD]
+    if start_ns is not None and held:
+        yield from recording.messages(held, None, start_ns)
 
 
 def _decoded(
@@ -120,4 +154,10 @@ def _decoded(
             continue
         if isinstance(message, SceneObjects):
             message = usable(message, reading.dropped)
-        yield channel, raw.log_time_ns, message
+        if isinstance(message, TFMessage):  # one message may hold odometry and where a sensor is
+            yield TF_STATIC, raw.log_time_ns, message
+        else:
+            yield channel, raw.log_time_ns, message
+        odometry = odometry_from(message) if channel == ODOMETRY else None
+        if odometry is not None and odometry is not message:
+            yield ODOMETRY, raw.log_time_ns, odometry

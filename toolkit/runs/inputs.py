@@ -9,9 +9,10 @@ from toolkit import channels
 from toolkit.errors import UsageError
 from toolkit.messages.codec import Message
 from toolkit.messages.images import CameraInfo, CompressedImage, Image
-from toolkit.messages.poses import Odometry
+from toolkit.messages.poses import Odometry, PoseStamped
 from toolkit.messages.scan import LaserScan
 from toolkit.messages.scene import SceneObjects
+from toolkit.messages.transforms import TFMessage
 from toolkit.recording.reader import Recording
 from toolkit.stage import Channel, Connection
 
@@ -20,23 +21,28 @@ OWN_OBJECTS = frozenset({"/landmarks/scan_objects", channels.MAP.topic, channels
 
 @dataclass(frozen=True, slots=True)
 class Role:
-    """What a channel is to the stages, the option that chooses its topic, and the messages that fit."""
+    """What a channel is to the stages, the option that chooses its topic, and the messages that fit.
+
+    `others` are messages that do as well, of a topic that the user chooses or that has the name `usual`.
+    """
 
     name: str
     option: str
     messages: tuple[type[Message], ...]
+    others: tuple[type[Message], ...] = ()
+    usual: str = ""
 
     @property
     def types(self) -> tuple[str, ...]:
-        """The message types that fit."""
-        return tuple(message.ROS_TYPE for message in self.messages)
+        """The message types that can be chosen."""
+        return tuple(message.ROS_TYPE for message in (*self.messages, *self.others))
 
 
 ROLES: Mapping[Channel[Any], Role] = {
     channels.CAMERA_IMAGE: Role("image", "--image", (CompressedImage, Image)),
     channels.CAMERA_INFO: Role("camera_info", "--remap", (CameraInfo,)),
     channels.SCAN: Role("scan", "--scan", (LaserScan,)),
-    channels.ODOMETRY: Role("odometry", "--odom", (Odometry,)),
+    channels.ODOMETRY: Role("odometry", "--odom", (Odometry,), (TFMessage, PoseStamped), channels.TF.topic),
     channels.SCENE_OBJECTS: Role("scene_objects", "--remap", (SceneObjects,)),
 }
 
@@ -66,7 +72,10 @@ def parse_remaps(texts: Sequence[str]) -> dict[str, str]:
 
 def topics_for(role: Role, present: Collection[tuple[str, str]]) -> list[str]:
     """Topics that fit a role, of (topic, message type); scene objects on our own topic leave the others out."""
-    fitting = sorted({topic for topic, message_type in present if message_type in role.types})
+    first = {message.ROS_TYPE for message in role.messages}
+    fitting = sorted({topic for topic, message_type in present if message_type in first})
+    if not fitting and role.usual:
+        fitting = sorted({topic for topic, kind in present if topic == role.usual and kind in role.types})
     if role.name == "scene_objects":
         if channels.SCENE_OBJECTS.topic in fitting:
             return [channels.SCENE_OBJECTS.topic]
@@ -85,8 +94,9 @@ def choose(recording: Recording, channel: Channel[Any], choice: Choice) -> tuple
         for entry in recording.channels
     ]
     role = ROLES.get(channel)
-    if role is None:
-        return tuple(connection for topic, connection in named if topic == channel.topic)
+    if role is None:  # transforms that never change come on /tf as well, from ROS 1 and some drivers
+        topics = {channel.topic, channels.TF.topic} if channel == channels.TF_STATIC else {channel.topic}
+        return tuple(connection for topic, connection in named if topic in topics)
     present = [(topic, connection.message_type) for topic, connection in named]
     asked = choice.topics.get(role.name)
     fitting = topics_for(role, present)
@@ -109,9 +119,10 @@ def choose(recording: Recording, channel: Channel[Any], choice: Choice) -> tuple
 
 
 def message_type(channel: Channel[Any], connection: Connection) -> type[Message]:
-    """The dataclass of a connection's messages, where it is read as a channel: an image has two."""
+    """The dataclass of a connection's messages, where it is read as a channel: an image has two, odometry three."""
     role = ROLES.get(channel)
-    fitting = (message for message in role.messages if connection.message_type == message.ROS_TYPE) if role else ()
+    known = (*role.messages, *role.others) if role else ()
+    fitting = (message for message in known if connection.message_type == message.ROS_TYPE)
     return next(iter(fitting), channel.message)
 
 

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from toolkit.messages.codec import decode
 from toolkit.recording.blocks import Progress
 from toolkit.recording.reader import Recording, open_recording
 from toolkit.recording.writer import RecordingWriter, create_recording
-from toolkit.runs.bundles import Reading, Span, inputs_of, read_bundles
+from toolkit.runs.bundles import Reading, Span, held_before, inputs_of, read_bundles
 from toolkit.runs.config import effective
 from toolkit.runs.inputs import beside_camera_info
 from toolkit.runs.tallies import tally
@@ -67,7 +68,8 @@ def run_stage(stage: Stage, config: Any, job: Job, progress: Progress | None = N
         )
         metadata = {**recording.metadata, RUN: manifest.entries()}
         with create_recording(job.output, metadata) as writer:
-            raws = _copy(recording, writer, job, inputs, replaced, progress)
+            held = held_before(recording, inputs, job.span.start_ns)
+            raws = chain(held, _copy(recording, writer, job, inputs, replaced, progress))
             bundles = read_bundles(raws, inputs, stage.reads, reading)
             for result in stage.process(bundles, config, job.resources):
                 if isinstance(result, Omission):
