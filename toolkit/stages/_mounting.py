@@ -66,9 +66,9 @@ class Mounting:
         ]
         self._seen, self._tree, self._found = message, FrameTree.of([*edges, *self._own]), {}
 
-    """Transforms of a TOML or JSON file: a list `transforms` of `parent`, `child`, `xyz` (m), `rpy` or `quaternion`.
+
 def read_extrinsics(path: Path) -> list[Edge]:
-    """Transforms of a TOML or JSON file: a list `transforms` of `parent`, `child`, `xyz` (m), and `rpy` or `quaternion`.
+    """Transforms of a TOML or JSON file: a list `transforms` of `parent`, `child`, `xyz` (m), `rpy` or `quaternion`.
 
     `rpy` are roll, pitch, yaw in rad about the parent's fixed axes, as in a URDF; `quaternion` is x, y, z, w. Without
     either the axes are parallel. For example, in TOML::
