@@ -44,7 +44,8 @@ def build(asked: str | None) -> typer.Typer:
         if hasattr(module, "app"):
             app.add_typer(module.app, name=verb, help=short_help)
         else:
-            app.command(verb, help=module.command.__doc__ or short_help)(module.command)
+            settings = getattr(module, "context_settings", None)
+            app.command(verb, help=module.command.__doc__ or short_help, context_settings=settings)(module.command)
     return app
 
 
