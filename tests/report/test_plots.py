@@ -2,6 +2,7 @@
 
 import io
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -122,7 +123,7 @@ def test_same_input_same_bytes(form: str, database: Path, log: Path) -> None:
     pictures = []
     for _ in range(2):
         stream = io.BytesIO()
-        save(gather([database, log], aligned=False)[0], stream, form, "A title")
+        save(partial(figure, gather([database, log], aligned=False)[0], "A title"), stream, form)
         pictures.append(stream.getvalue())
     assert pictures[0] == pictures[1]
     assert len(pictures[0]) > 5000

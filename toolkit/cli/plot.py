@@ -1,5 +1,7 @@
 """Plot maps and runs: landmarks, paths, positions and their errors."""
 
+from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -7,6 +9,14 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import PARTIAL, progress, warn
+
+
+class Show(StrEnum):
+    """What a plot shows."""
+
+    MAP = "map"
+    POSITIONS = "positions"
+    ERRORS = "errors"
 
 
 def command(
@@ -18,13 +28,17 @@ def command(
     align: Annotated[
         bool, typer.Option("--align", help="Move estimates by the SE(2) that fits the truth best.")
     ] = False,
+    show: Annotated[
+        Show, typer.Option("--show", help="The map with its runs, positions beside the truth, or boxes of the errors.")
+    ] = Show.MAP,
     title: Annotated[str, typer.Option("--title", help="A line above the plot.")] = "",
 ) -> None:
     """Plot INPUT... into one picture (.png, .svg, .pdf): landmarks by class, paths, positions and their errors."""
     from toolkit.atomic import atomic_file
     from toolkit.errors import UsageError
+    from toolkit.report.comparison import errors_figure, positions_figure
     from toolkit.report.drawing import gather
-    from toolkit.report.plots import FORMATS, save
+    from toolkit.report.plots import FORMATS, figure, save
 
     form = output.suffix.lower().removeprefix(".")
     if form not in FORMATS:
@@ -33,8 +47,9 @@ def command(
         )
     with progress("read", sum(path.stat().st_size for path in inputs if path.is_file())) as advance:
         drawing, losses = gather(inputs, aligned=align, progress=advance)
+    draw = {Show.MAP: figure, Show.POSITIONS: positions_figure, Show.ERRORS: errors_figure}[show]
     with atomic_file(output) as stream:
-        save(drawing, stream, form, title)
+        save(partial(draw, drawing, title), stream, form)
     for loss in losses:
         warn(f"warning: {loss}")
     if losses:

@@ -2,6 +2,7 @@
 
 import warnings
 from collections import Counter
+from collections.abc import Callable
 from typing import Any, BinaryIO
 
 import matplotlib as mpl
@@ -36,13 +37,13 @@ _STYLE: dict[Any, Any] = {  # matplotlib's own type is a list of several hundred
 }
 
 
-def save(drawing: Drawing, stream: BinaryIO, form: str, title: str = "") -> None:
-    """Draw into a stream as `png`, `svg` or `pdf`. Same drawing, same bytes."""
+def save(draw: Callable[[], Figure], stream: BinaryIO, form: str) -> None:
+    """Draw a figure into a stream as `png`, `svg` or `pdf`. Same figure, same bytes."""
     with mpl.rc_context(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
-        figure(drawing, title).savefig(stream, format=form, metadata=FORMATS[form], bbox_inches="tight", pad_inches=0.1)
+        draw().savefig(stream, format=form, metadata=FORMATS[form], bbox_inches="tight", pad_inches=0.1)
 
 
 def figure(drawing: Drawing, title: str = "") -> Figure:
