@@ -1,12 +1,16 @@
-"""Bundles: odometry at their stamps, and what found no partner."""
+"""Bundles: odometry at their stamps, what is held, what is beside them, and what found no partner."""
 
 import numpy as np
 import pytest
 
-from toolkit.channels import ODOMETRY, SCENE_OBJECTS
-from toolkit.messages.poses import Odometry
+from toolkit.channels import DETECTIONS, ODOMETRY, SCENE_OBJECTS, TF_STATIC
+from toolkit.geometry import se2
+from toolkit.messages.detections import Detections
+from toolkit.messages.poses import Odometry, PoseStamped
 from toolkit.messages.scene import SceneObjects
+from toolkit.messages.transforms import TFMessage, Transform
 from toolkit.recording.association import WINDOW_NS, Association, associate
+from toolkit.recording.trail import odometry_from
 from toolkit.stage import Bundle
 
 SECOND = 10**9
@@ -90,3 +94,111 @@ def test_a_loop_back_to_the_start_still_counts_as_way() -> None:
     assert at is not None
     np.testing.assert_allclose(at.odom_from_base, 0, atol=1e-12)
     np.testing.assert_allclose([at.way_m, at.turned_rad], [4.0, 2 * np.pi], atol=1e-9)
+
+
+def test_velocity_is_the_bases_own() -> None:
+    at = 2 * SECOND
+    turning = [odometry(SECOND + 1, 0, 0, np.pi / 2), odometry(at, *exp([0.3, 0.0, 0.4], [0, 0, np.pi / 2]))]
+    found, _ = bundles(
+        (0, odometry(1, 0, 0, np.pi / 2)), (1, turning[0]), (2, turning[1]), (3, scene(at - SECOND // 2))
+    )
+    assert found[0].odometry is not None
+    np.testing.assert_allclose(found[0].odometry.velocity, [0.3, 0.0, 0.4], atol=1e-6)
+
+
+def exp(twist: list[float], start: list[float]) -> np.ndarray:
+    return se2.compose(start, se2.exp(twist))
+
+
+def test_held_messages_are_the_latest_so_far_and_transforms_gather() -> None:
+    counts = Association()
+    messages = [
+        (SCENE_OBJECTS, 0, scene(1)),
+        (TF_STATIC, 1, mounts(laser=1.0)),
+        (TF_STATIC, 2, mounts(camera=2.0)),
+        (SCENE_OBJECTS, 3, scene(4)),
+        (TF_STATIC, 5, mounts(laser=3.0)),
+        (SCENE_OBJECTS, 6, scene(7)),
+    ]
+    found = list(associate(messages, SCENE_OBJECTS, counts, with_odometry=False, held=[TF_STATIC]))
+    held = [bundle.get(TF_STATIC) for bundle in found]
+    assert [heights(message) for message in held] == [
+        {"laser": 1.0},  # a bundle waits for the first transforms
+        {"laser": 1.0, "camera": 2.0},
+        {"laser": 3.0, "camera": 2.0},
+    ]
+    assert held[1] is not held[2]
+
+
+def mounts(**heights_m: float) -> TFMessage:
+    level = np.array([0.0, 0.0, 0.0, 1.0])
+    steps = [Transform(0, "base", name, np.array([0.0, 0.0, z]), level) for name, z in heights_m.items()]
+    return TFMessage(tuple(steps))
+
+
+def heights(message: TFMessage | None) -> dict[str, float]:
+    assert message is not None
+    return {step.child_frame_id: float(step.translation_m[2]) for step in message.transforms}
+
+
+def test_nobody_gets_held_messages_that_never_come() -> None:
+    messages = [(SCENE_OBJECTS, i * SECOND, scene(i * SECOND + 1)) for i in range(6)]
+    found = list(associate(messages, SCENE_OBJECTS, Association(), with_odometry=False, held=[TF_STATIC]))
+    assert len(found) == 6
+    assert all(bundle.get(TF_STATIC) is None for bundle in found)
+
+
+def beside(scenes_ms: list[int], images_ms: list[int], late_ms: int = 0) -> tuple[list[int | None], Association]:
+    """Milliseconds of the image beside each scene; images are logged late."""
+    counts = Association()
+    messages = [(SCENE_OBJECTS, at, scene(at * 10**6)) for at in scenes_ms]
+    messages += [(DETECTIONS, at + late_ms, image(at * 10**6)) for at in images_ms]
+    stream = [(channel, at * 10**6, message) for channel, at, message in sorted(messages, key=lambda entry: entry[1])]
+    found = associate(stream, SCENE_OBJECTS, counts, with_odometry=False, beside=[DETECTIONS])
+    partners = [bundle.get(DETECTIONS) for bundle in found]
+    return [None if partner is None else partner.stamp_ns // 10**6 for partner in partners], counts
+
+
+def image(stamp_ns: int) -> Detections:
+    return Detections(stamp_ns, "camera", (), (), np.zeros((0, 4)))
+
+
+@pytest.mark.parametrize("late_ms", [0, 30, 900])
+def test_beside_a_bundle_is_what_is_nearest(late_ms: int) -> None:
+    images = [*range(113, 2000, 100)]
+    found, counts = beside([*range(100, 2000, 200)], images, late_ms)
+    assert found == [113 + 200 * i for i in range(10)]
+    assert counts.unpaired == {DETECTIONS.topic: 9}
+    assert not counts.alone
+
+
+def test_an_image_belongs_to_the_bundle_nearest_to_it_only() -> None:
+    found, counts = beside([100, 200, 300, 400, 500, 1000], [180, 420])
+    assert found == [None, 180, None, 420, None, None]
+    assert counts.alone == {DETECTIONS.topic: 4}
+    assert counts.unpaired == {DETECTIONS.topic: 0}
+
+
+def test_an_image_too_far_away_belongs_to_none() -> None:
+    found, counts = beside([1000, 2000], [600, 1500, 2249])
+    assert found == [None, 2249]
+    assert counts.unpaired == {DETECTIONS.topic: 2}
+
+
+def test_odometry_comes_as_poses_and_as_transforms() -> None:
+    pose = PoseStamped.planar(5, "world", (1.0, 2.0, 0.5))
+    from_pose = odometry_from(pose)
+    steps = [
+        Transform.planar(6, ("map", "odom"), (9.0, 9.0, 0.0)),
+        Transform.planar(7, ("odom", "trailer"), (8.0, 8.0, 0.0)),
+        Transform.planar(8, ("/odom", "/base_link"), (1.0, 2.0, 0.5)),
+    ]
+    from_transforms = odometry_from(TFMessage(tuple(steps)))
+    assert from_pose is not None
+    assert from_transforms is not None
+    assert (from_pose.stamp_ns, from_pose.frame_id) == (5, "world")
+    assert (from_transforms.stamp_ns, from_transforms.frame_id) == (8, "/odom")
+    for found in (from_pose, from_transforms):
+        np.testing.assert_allclose(found.pose, [1.0, 2.0, 0.5])
+    assert odometry_from(TFMessage((steps[0],))) is None
+    assert odometry_from(scene(1)) is None
