@@ -1,0 +1,123 @@
+"""Cross-sections of objects at LiDAR height, and how far into them a ray gets before it meets them."""
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from toolkit.geometry.se2 import Array
+
+_FINEST_M = 0.0025
+_CELLS_ACROSS = 400
+_TURN_ERROR_M = 0.003
+_SIZES = 17
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A union of `discs` (x, y, radius) and `boxes` (x, y, length along x, width) in m about the object's centre.
+
+    `apart_m` makes it two discs like the only one in `discs`, whose centres are so far apart, from and to. The shape
+    looks the same again after `turn_rad`; 0 for any turn.
+    """
+
+    discs: tuple[tuple[float, float, float], ...] = ()
+    boxes: tuple[tuple[float, float, float, float], ...] = ()
+    apart_m: tuple[float, float] | None = None
+    turn_rad: float = 2 * np.pi
+
+    @property
+    def reach_m(self) -> float:
+        """Distance from the centre to the farthest point."""
+        if self.apart_m is not None:
+            return self.apart_m[1] / 2 + self.discs[0][2]
+        discs = [np.hypot(x, y) + radius for x, y, radius in self.discs]
+        boxes = [np.hypot(abs(x) + length / 2, abs(y) + width / 2) for x, y, length, width in self.boxes]
+        return float(max(discs + boxes))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Profile:
+    """Where rays meet a shape: `depths_m` (sizes, headings, offsets), inf for a miss.
+
+    A ray has a heading in the shape's frame, from 0 to a full turn, and passes the centre, which lies so many
+    `step_m` to its left as the offset is beyond the middle one. The depth counts from where the ray is abreast of the
+    centre, negative before.
+    """
+
+    depths_m: NDArray[np.float32]
+    step_m: float
+
+    @property
+    def least_width_m(self) -> float:
+        """The width that every view shows without a hole; 0 where rays may pass between the parts."""
+        seen = np.isfinite(self.depths_m)
+        whole = (np.diff(seen, axis=-1).sum(axis=-1) == 2).all()
+        return float(seen.sum(axis=-1).min()) * self.step_m if whole else 0.0
+
+
+@cache
+def profile(shape: Shape) -> Profile:
+    """The shape as rays meet it."""
+    reach, step = shape.reach_m, max(_FINEST_M, 2 * shape.reach_m / _CELLS_ACROSS)
+    count = np.ceil(reach / step) + 1
+    offsets = step * np.arange(-count, count + 1)
+    turns = 1 if shape.turn_rad == 0 else int(np.ceil(np.pi * reach / _TURN_ERROR_M))
+    headings = 2 * np.pi * np.arange(turns) / turns
+    sizes = [None] if shape.apart_m is None else np.linspace(*shape.apart_m, _SIZES).tolist()
+    depths = np.stack([_depths(shape, headings, offsets, size) for size in sizes])
+    depths[..., [0, -1]] = np.inf
+    return Profile(depths.astype(np.float32), float(step))
+
+
+def disc(radius_m: float) -> Shape:
+    """A disc."""
+    return Shape(discs=((0.0, 0.0, radius_m),), turn_rad=0.0)
+
+
+def legs(radius_m: float, apart_m: tuple[float, float]) -> Shape:
+    """Two legs whose centres are so far apart, from and to; the object's centre lies between them."""
+    return Shape(discs=((0.0, 0.0, radius_m),), apart_m=apart_m, turn_rad=np.pi)
+
+
+def box(length_m: float, width_m: float, corner_m: float = 0.0) -> Shape:
+    """A rectangle, its corners rounded."""
+    if corner_m <= 0:
+        return Shape(boxes=((0.0, 0.0, length_m, width_m),), turn_rad=np.pi)
+    x, y = length_m / 2 - corner_m, width_m / 2 - corner_m
+    corners = tuple((side_x * x, side_y * y, corner_m) for side_x, side_y in product((1, -1), repeat=2))
+    boxes = ((0.0, 0.0, length_m, 2 * y), (0.0, 0.0, 2 * x, width_m))
+    return Shape(corners, boxes, turn_rad=np.pi)
+
+
+def _into_disc(feet: Array, ahead: Array, radius_m: float) -> Array:
+    """Depth at which rays through `feet` (..., 2) along unit vectors enter a disc about the origin."""
+    along = (feet * ahead).sum(axis=-1)
+    inside = along**2 - (feet**2).sum(axis=-1) + radius_m**2
+    return np.where(inside >= 0, -along - np.sqrt(np.maximum(inside, 0)), np.inf)
+
+
+def _into_box(feet: Array, ahead: Array, half_m: Array) -> Array:
+    """Depth at which rays through `feet` (..., 2) along unit vectors enter a box about the origin."""
+    safe = np.where(np.abs(ahead) < 1e-9, 1e-9, ahead)
+    first, second = (-half_m - feet) / safe, (half_m - feet) / safe
+    enter, leave = np.minimum(first, second).max(axis=-1), np.maximum(first, second).min(axis=-1)
+    return np.where(enter <= leave, enter, np.inf)
+
+
+def _depths(shape: Shape, headings: Array, offsets: Array, apart_m: float | None) -> Array:
+    """Depths (headings, offsets) of a shape of one size."""
+    discs = shape.discs
+    if apart_m is not None:
+        discs = tuple((0.0, side * apart_m / 2, shape.discs[0][2]) for side in (1, -1))
+    ahead = np.stack([np.cos(headings), np.sin(headings)], axis=-1)[:, None, :]
+    left = np.stack([-np.sin(headings), np.cos(headings)], axis=-1)[:, None, :]
+    nearest = np.full((len(headings), len(offsets)), np.inf)
+    feet = -offsets[None, :, None] * left
+    for x, y, radius in discs:
+        nearest = np.minimum(nearest, _into_disc(feet - (x, y), ahead, radius))
+    for x, y, length, width in shape.boxes:
+        nearest = np.minimum(nearest, _into_box(feet - (x, y), ahead, np.array([length, width]) / 2))
+    return nearest
