@@ -25,6 +25,7 @@ ANNOTATIONS = Channel("/camera/annotations", ImageAnnotations)
 SCAN_OBJECTS = Channel("/landmarks/scan_objects", ScanObjects)
 SCAN_FILTERED = Channel("/landmarks/scan_filtered", LaserScan)
 SCENE_OBJECTS = Channel("/landmarks/scene_objects", SceneObjects)
+SCENE_MARKERS = Channel("/landmarks/scene_markers", MarkerArray)
 
 MAP_MARKERS = Channel("/landmarks/map_markers", MarkerArray)
 MAP_PATH = Channel("/landmarks/map_path", Path)

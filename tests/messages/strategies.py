@@ -114,7 +114,8 @@ MESSAGES = st.one_of(
     scan_objects(),
     detections(),
     annotations(),
-    st.builds(MarkerArray, stamp, text, st.lists(marker, min_size=1, max_size=3).map(tuple)),
+    st.builds(MarkerArray, stamp, text, st.lists(marker, min_size=1, max_size=3).map(tuple), st.booleans()),
+    st.builds(MarkerArray, stamp, text, st.just(()), st.just(True)),
     match,
     st.builds(UInt8, st.integers(0, 255)),
 )

@@ -42,29 +42,38 @@ class Marker:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MarkerArray:
-    """Markers of one time and frame; none means that there is nothing to draw."""
+    """Markers of one time and frame; `replaces` takes away all that were drawn on the topic before."""
 
     ROS_TYPE: ClassVar[str] = "visualization_msgs/msg/MarkerArray"
 
     stamp_ns: int
     frame_id: str
     markers: tuple[Marker, ...]
+    replaces: bool = False
 
     def to_ros(self) -> Any:
         """See `Message`."""
         header = header_to_ros(self.stamp_ns, self.frame_id)
-        return make("visualization_msgs/MarkerArray", markers=[_to_ros(header, marker) for marker in self.markers])
+        first = [_to_ros(header, _ALL, _DELETE_ALL)] if self.replaces else []
+        return make(
+            "visualization_msgs/MarkerArray", markers=[*first, *(_to_ros(header, marker) for marker in self.markers)]
+        )
 
     @classmethod
     def from_ros(cls, ros: Any) -> Self:
         """See `Message`; an empty array has the stamp 0 and no frame."""
         if not ros.markers:
             return cls(0, "", ())
-        header = ros.markers[0].header
-        return cls(stamp_from_ros(header.stamp), header.frame_id, tuple(_from_ros(marker) for marker in ros.markers))
+        header, replaces = ros.markers[0].header, ros.markers[0].action == _DELETE_ALL
+        shown = tuple(_from_ros(marker) for marker in ros.markers[replaces:])
+        return cls(stamp_from_ros(header.stamp), header.frame_id, shown, replaces)
 
 
-def _to_ros(header: Any, marker: Marker) -> Any:
+_ADD, _DELETE_ALL = 0, 3
+_ALL = Marker("", 0, Shape.CYLINDER, np.zeros(3), np.zeros(3), (0.0, 0.0, 0.0, 0.0))
+
+
+def _to_ros(header: Any, marker: Marker, action: int = _ADD) -> Any:
     r, g, b, a = marker.color
     nothing = np.zeros(0, dtype=np.uint8)
     return make(
@@ -73,7 +82,7 @@ def _to_ros(header: Any, marker: Marker) -> Any:
         ns=marker.name,
         id=marker.number,
         type=int(marker.shape),
-        action=0,
+        action=action,
         pose=pose_to_ros(marker.position_m, (0.0, 0.0, 0.0, 1.0)),
         scale=point_to_ros("geometry_msgs/Vector3", marker.size_m),
         color=make("std_msgs/ColorRGBA", r=r, g=g, b=b, a=a),

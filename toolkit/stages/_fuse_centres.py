@@ -1,0 +1,64 @@
+"""Where the objects in a scan are if they are of a class: their centres, and how well the scan fits that."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from toolkit.geometry.angles import wrap
+from toolkit.geometry.se2 import Array
+from toolkit.messages.scan_objects import ScanObjects
+from toolkit.stages._fuse_sights import Sights, View
+from toolkit.stages._fuse_sizes import Size
+
+SURFACE = ""
+"""The hypothesis of no known shape: the middle of the near surface."""
+
+_LEAST_FIT = 0.1
+_RADIUS_ERROR = 0.3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Centres:
+    """Positions (N, 2), covariances (N, 2, 2) and fits (N,) of N objects under one class; 1 is the best fit."""
+
+    positions_xy: Array
+    covariances: Array
+    fits: Array
+
+
+def centres_of(objects: ScanObjects, name: str, radii_m: Array) -> Centres:
+    """Centres by the class's own most probable shape; without one, of discs of radii (N,) behind the surface."""
+    count = len(objects)
+    positions, covariances, fits = np.zeros((count, 2)), np.zeros((count, 2, 2)), np.ones(count)
+    for i, options in enumerate(objects.hypotheses):
+        row = next((k for k, (known, _) in enumerate(options) if known == name), None)
+        if row is None:
+            positions[i], covariances[i] = _behind(objects.positions_xy[i][-1], objects.covariances[i][-1], radii_m[i])
+        else:
+            positions[i], covariances[i] = objects.positions_xy[i][row], objects.covariances[i][row]
+            fits[i] = fits_of(objects, i)[name]
+    return Centres(positions, covariances, fits)
+
+
+def fits_of(objects: ScanObjects, i: int) -> dict[str, float]:
+    """How well the scan fits each class's shapes, and none (""), beside the best; never less than a tenth."""
+    shares: dict[str, float] = {}
+    for name, share in objects.hypotheses[i]:
+        shares[name] = shares.get(name, 0.0) + share
+    best = max(shares.values(), default=1.0) or 1.0
+    return {name: max(share / best, _LEAST_FIT) for name, share in shares.items()}
+
+
+def radii_in_boxes(objects: ScanObjects, view: View, sights: Sights, box: int, size: Size) -> Array:
+    """Radii (N,) of discs that have the objects' surfaces in front and fill the width of one box."""
+    surfaces = np.array([positions[-1] for positions in objects.positions_xy]).reshape(-1, 2)
+    distance = np.hypot(*view.from_camera(surfaces).T)
+    sine = min(float(np.sin(abs(wrap(sights.left[box] - sights.right[box])) / 2)), 0.9)
+    radii: Array = np.minimum(distance * sine / (1 - sine), size.width_m[1] / 2)
+    return radii
+
+
+def _behind(surface_xy: Array, covariance: Array, radius_m: float) -> tuple[Array, Array]:
+    distance = float(np.hypot(*surface_xy))
+    ahead = surface_xy / distance if distance > 0 else np.array([1.0, 0.0])
+    return surface_xy + radius_m * ahead, covariance + (_RADIUS_ERROR * radius_m) ** 2 * np.outer(ahead, ahead)

@@ -1,0 +1,39 @@
+"""How large objects are, as far as an image shows it: by class, for the classes that a street has."""
+
+from dataclasses import dataclass
+
+Span = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Size:
+    """Least and largest measures of what a detector's box of a class holds, in m.
+
+    `foot_m` and `top_m` are heights above ground of its lower and upper edge, `width_m` is its width seen from any
+    side. `radius_m` is that of a circle around the object's cross-section at the LiDAR's height.
+    """
+
+    top_m: Span
+    width_m: Span
+    radius_m: float
+    foot_m: Span = (0.0, 0.0)
+
+
+SIZES: dict[str, Size] = {
+    "person": Size(top_m=(1.5, 1.95), width_m=(0.3, 0.9), radius_m=0.25),
+    "bicycle": Size(top_m=(0.8, 1.2), width_m=(0.4, 1.9), radius_m=0.81),
+    "car": Size(top_m=(1.2, 2.1), width_m=(1.4, 5.2), radius_m=2.27),
+    "traffic light": Size(top_m=(2.0, 6.0), width_m=(0.2, 0.8), radius_m=0.15, foot_m=(1.0, 5.0)),
+    "fire hydrant": Size(top_m=(0.5, 1.0), width_m=(0.25, 0.6), radius_m=0.15),
+    "stop sign": Size(top_m=(1.8, 3.2), width_m=(0.05, 0.95), radius_m=0.2, foot_m=(1.0, 2.4)),
+    "bench": Size(top_m=(0.4, 1.1), width_m=(0.45, 2.3), radius_m=0.64),
+    "backpack": Size(top_m=(0.35, 0.7), width_m=(0.25, 0.55), radius_m=0.22),
+    "suitcase": Size(top_m=(0.45, 1.2), width_m=(0.2, 0.7), radius_m=0.29),
+    "sports ball": Size(top_m=(0.15, 0.35), width_m=(0.15, 0.35), radius_m=0.15),
+    "chair": Size(top_m=(0.6, 1.3), width_m=(0.35, 0.9), radius_m=0.29),
+    "potted plant": Size(top_m=(0.25, 1.6), width_m=(0.2, 1.4), radius_m=0.18),
+}
+"""Real objects of these classes, their usual range."""
+
+ANY_SIZE = Size(top_m=(0.1, 6.0), width_m=(0.05, 6.0), radius_m=0.0)
+"""What stands on the ground and is nothing of the above."""
