@@ -30,7 +30,7 @@ class Rules:
     error: BoxError
     weighing: Weighing
     bearing_gate: float
-    gate: float
+    size_gate: float
     least_probability: float
     least_height_px: float
 
@@ -66,7 +66,7 @@ class Fuser:
         beliefs = [self._tracks[name].belief for name in objects.ids]
         named = [options[0] for options in detections.hypotheses]
         costs, radii = self._costs(objects, beliefs, [name for name, _ in named], sights, view)
-        pairs = _assigned(costs, self._rules.gate)
+        pairs = _assigned(costs)
         for box, i in pairs:
             name, score = named[box]
             rivals = np.exp((costs[box, i] - costs[box]) / 2)
@@ -93,7 +93,7 @@ class Fuser:
             sideways, upright = misfits(view, sights, box, (found.positions_xy, found.covariances), size, rules.error)
             earned = np.array([max(_share(belief, name), _LEAST_SHARE) for belief in beliefs])
             total = sideways + upright - 2 * np.log(found.fits) - 2 * np.log(earned)
-            possible = (sideways <= rules.bearing_gate) & (sideways + upright <= rules.gate)
+            possible = (sideways <= rules.bearing_gate) & (upright <= rules.size_gate)
             costs[box] = np.where(possible, total, _NEVER)
         return costs, radii
 
@@ -155,9 +155,9 @@ def _share(belief: Belief, name: str) -> float:
     return own / (1 + sum(odds.values()) + (0.0 if name in odds else own))
 
 
-def _assigned(costs: Array, gate: float) -> list[tuple[int, int]]:
+def _assigned(costs: Array) -> list[tuple[int, int]]:
     """Pairs (box, object) of the assignment that costs least, where a box alone costs more than any pair may."""
     boxes, objects = costs.shape
-    alone = np.full((boxes, boxes), gate + 30.0)
+    alone = np.full((boxes, boxes), _NEVER / 2)
     rows, columns = linear_sum_assignment(np.hstack([costs, alone]))
     return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if j < objects and costs[i, j] < _NEVER]

@@ -39,9 +39,9 @@ class FuseConfig:
     the scene if its most probable class has `min_probability`, and a scene has at least `min_objects`, else none.
     `sizes` add to the built-in ones, by class: what heights and widths of a box are plausible, and the radius at the
     LiDAR's height; a class without gets its radius from the width of its boxes. A box and an object belong together if
-    the chi-squares of their bearing and of everything are below `bearing_gate` and `gate`. Boxes are sure to
-    `edge_px` and `edge_share` of their size, bearings to `bearing_sigma_deg`, and an object's parts that the LiDAR
-    meets lie within `lateral_m` of its middle. `prior_odds`, `hit_odds`, `confusion`, `miss_odds` and `max_odds` say
+    the chi-squares of their bearing and of its height and width are below `bearing_gate` and `size_gate`. Boxes are
+    sure to `edge_px` and `edge_share` of their size, bearings to `bearing_sigma_deg`, and an object's parts that the
+    LiDAR meets lie within `lateral_m` of its middle. `prior_odds`, `hit_odds`, `confusion`, `miss_odds` and `max_odds` say
     how evidence adds up along a track: its odds of being of a class at first, how a detection raises them (at a score
     of 0.5), the share of that for every other class, what an image without it leaves of them if it would be
     `min_height_px` high there, and the most that they get. `rectified` images have no distortion and the projection
@@ -55,7 +55,7 @@ class FuseConfig:
     min_objects: Annotated[int, Field(ge=1)] = 2
     sizes: dict[str, Size] = field(default_factory=dict)
     bearing_gate: Positive = 9.0
-    gate: Positive = 14.0
+    size_gate: Positive = 9.0
     edge_px: Positive = 2.0
     edge_share: Share = 0.04
     bearing_sigma_deg: Positive = 0.3
@@ -114,7 +114,7 @@ def _rules(config: FuseConfig) -> Rules:
         error=BoxError(config.edge_px, config.edge_share, bearing_rad, config.lateral_m),
         weighing=Weighing(config.prior_odds, config.hit_odds, config.confusion, config.miss_odds, config.max_odds),
         bearing_gate=config.bearing_gate,
-        gate=config.gate,
+        size_gate=config.size_gate,
         least_probability=config.min_probability,
         least_height_px=config.min_height_px,
     )
