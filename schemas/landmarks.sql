@@ -54,3 +54,9 @@ CREATE TABLE source (
     bundles INTEGER NOT NULL CHECK (bundles >= 0),
     used INTEGER NOT NULL CHECK (used BETWEEN 0 AND bundles)
 ) STRICT;
+
+-- What ran to build the map, one JSON text per entry of the manifest; empty for a map that was imported or surveyed.
+CREATE TABLE manifest (
+    name TEXT PRIMARY KEY,
+    content TEXT NOT NULL
+) STRICT, WITHOUT ROWID;

@@ -20,3 +20,15 @@ def resource(folder: str, name: str) -> Path:
         if path.exists():
             return path
     raise ToolkitError(f"{folder}/{name} is missing from the installation; reinstall mcap-landmarks")
+
+
+def detector() -> Path:
+    """Path of the detector that detects when the user names no other.
+
+    Raises:
+        ToolkitError: this installation has none.
+    """
+    path = _PACKAGE / "vision" / "detector.onnx"
+    if path.exists():
+        return path
+    raise ToolkitError(f"{path.name} is missing from the installation; reinstall mcap-landmarks, or give --model FILE")

@@ -18,10 +18,9 @@ from tests.vision.networks import SIZES, Export, yolov5
 from toolkit.channels import CAMERA_IMAGE
 from toolkit.messages.images import CompressedImage
 from toolkit.recording.writer import create_recording
-from toolkit.runs.config import stage_config
-from toolkit.runs.pipeline import Job, run_stage
+from toolkit.runs.pipeline import run_stages
+from toolkit.runs.plan import Request
 from toolkit.stage import Stamped
-from toolkit.stages.detect import STAGE
 from toolkit.vision.letterbox import fit, tensor
 from toolkit.vision.session import open_session
 
@@ -69,14 +68,14 @@ def _against_bare(
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     session = onnxruntime.InferenceSession(str(model), options, providers=["CPUExecutionProvider"])
-    config = stage_config(STAGE.config, "detect", {"threads": threads})
+    request = Request(log, {"detect": {"threads": threads}}, {"model": model}, results_only=True, force=True)
 
     def bare() -> None:
         for array in tensors:
             session.run(None, {"images": array})
 
     def stage() -> None:
-        run_stage(STAGE, config, Job(log, out, {"model": model}))
+        run_stages(request, out, ["detect"], "detect")
 
     alone, whole = _seconds(bare, stage, rounds)
     peers = {"stage images/s": len(tensors) / whole, "session.run images/s": len(tensors) / alone}

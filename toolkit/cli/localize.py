@@ -8,13 +8,13 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import PARTIAL, moment, progress, say, say_json, table, warn
-from toolkit.cli.stage_runs import Configured, finish, run_over
+from toolkit.cli.stage_runs import Configured, Given, finish, run_over
 from toolkit.errors import UsageError
 
 if TYPE_CHECKING:
     from toolkit.runs.bundles import Reading, Span
     from toolkit.runs.moment import Answer
-    from toolkit.runs.pipeline import StageRun
+    from toolkit.runs.pipeline import LogRun
 
 
 def command(
@@ -32,11 +32,21 @@ def command(
     end: options.End = None,
     remap: options.Remap = None,
     odom: options.OdometryTopic = None,
+    scan: options.ScanTopic = None,
+    image: options.ImageTopic = None,
+    model: options.Model = None,
+    extrinsics: options.Extrinsics = None,
+    image_rate: options.ImageRate = None,
+    every: options.Every = None,
     results_only: options.ResultsOnly = False,
+    force: options.Force = False,
     json: options.Json = False,
 ) -> None:
-    """Localize every bundle of scene objects in LOG... in a landmark map; write the input with pose and match."""
-    span = options.span(start, end, remap, {"odometry": odom})
+    """Localize every bundle of LOG... in a landmark map; write the input with pose and match.
+
+    Where a log has no scene objects, they are made first, from images and scans.
+    """
+    span = options.span(start, end, remap, {"odometry": odom, "scan": scan, "image": image})
     configured = config_file, settings, method
     asked_ns = options.time_ns(at, "--at")
     if asked_ns is not None:
@@ -46,35 +56,33 @@ def command(
         return
     if output is None:
         raise UsageError("localize needs -o FILE to write to, or --at TIME for one answer")
-    finish(
-        "localize",
-        run_over("localize", logs, output, configured, {"map": map_file}, span, results_only),
-        _document,
-        _print,
-        json,
-    )
+    files = {"map": map_file, "model": model, "extrinsics": extrinsics}
+    given = Given(configured, span, files, options.thinning(image_rate, every), results_only, force)
+    runs = run_over("localize", ["localize"], logs, output, given, lacking=True)
+    finish("localize", runs, _document, _print, json)
 
 
-def _document(run: "StageRun") -> dict[str, object]:
-    return {"bundles": run.reading.association.bundles, "statuses": _statuses(run)}
+def _document(run: "LogRun") -> dict[str, object]:
+    return {"bundles": run.outcome.bundles, "statuses": _statuses(run)}
 
 
-def _statuses(run: "StageRun") -> dict[str, int]:
+def _statuses(run: "LogRun") -> dict[str, int]:
     from toolkit.messages.match import Status
 
-    return {status.name.lower(): run.counts[status.name.lower()] for status in Status}
+    return {status.name.lower(): run.outcome.counts.get(status.name.lower(), 0) for status in Status}
 
 
-def _print(runs: "list[StageRun]") -> None:
+def _print(runs: "list[LogRun]") -> None:
     names = list(_statuses(runs[0]))
     rows = []
     for run in runs:
         counts = _statuses(run)
-        rows.append([str(run.output), str(run.reading.association.bundles), *(str(counts[name]) for name in names)])
+        rows.append([str(run.output), str(run.outcome.bundles), *(str(counts[name]) for name in names)])
     table(["output", "bundles", *names], rows)
     for run in runs:
-        share = run.counts["localized"] / max(run.reading.association.bundles, 1)
-        say(f"{run.output}: {run.counts['localized']} bundles localized ({100 * share:.1f} %)")
+        localized = _statuses(run)["localized"]
+        share = localized / max(run.outcome.bundles, 1)
+        say(f"{run.output}: {localized} bundles localized ({100 * share:.1f} %)")
 
 
 def _at(log: Path, map_file: Path, asked_ns: int, configured: Configured, span: "Span", json: bool) -> None:

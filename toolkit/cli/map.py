@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from toolkit.cli import options
-from toolkit.cli.console import PARTIAL, progress, say, say_json, table, warn
+from toolkit.cli.console import PARTIAL, progress, say, say_json, table
+from toolkit.cli.stage_runs import Given, tell, told
 from toolkit.errors import UsageError
 
 if TYPE_CHECKING:
-    from toolkit.runs.bundles import Span
-    from toolkit.runs.mapping import MapRun
+    from toolkit.runs.bench import StageRun
+    from toolkit.runs.mapping import MappedLog, MapRun
 
 
 def command(
@@ -29,63 +30,47 @@ def command(
     end: options.End = None,
     remap: options.Remap = None,
     odom: options.OdometryTopic = None,
+    scan: options.ScanTopic = None,
+    image: options.ImageTopic = None,
+    model: options.Model = None,
+    extrinsics: options.Extrinsics = None,
+    image_rate: options.ImageRate = None,
+    every: options.Every = None,
     results_only: options.ResultsOnly = False,
+    force: options.Force = False,
     json: options.Json = False,
 ) -> None:
-    """Build one landmark map from LOG...; with -o also write each log with its results."""
+    """Build one landmark map from LOG...; with -o also write each log with its results.
+
+    Where a log has no scene objects, they are made first, from images and scans.
+    """
     if from_reference:
         _from_reference(logs, map_file, json)
         return
-    span = options.span(start, end, remap, {"odometry": odom})
-    run = _build(logs, map_file, prior, (config_file, settings or [], method), span, output, results_only)
+    span = options.span(start, end, remap, {"odometry": odom, "scan": scan, "image": image})
+    files = {"model": model, "extrinsics": extrinsics}
+    configured, thinning = (config_file, settings, method), options.thinning(image_rate, every)
+    run = _build(logs, map_file, prior, output, Given(configured, span, files, thinning, results_only, force))
     for log in run.logs:
-        for reason, count in log.reading.notes().items():
-            warn(f"note: {log.path}: {count} {reason}")
-        for loss in log.reading.losses:
-            warn(f"warning: {log.path}: {loss}")
+        tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)
     if json:
         say_json("map", _document(run, map_file))
     else:
         _print(run, map_file)
-    if any(log.reading.losses for log in run.logs):
+    if any(log.outcome.losses for log in run.logs):
         raise typer.Exit(PARTIAL)
 
 
-def _build(
-    logs: list[Path],
-    map_file: Path,
-    prior: Path | None,
-    configured: tuple[Path | None, list[str], str | None],
-    span: "Span",
-    output: Path | None,
-    results_only: bool,
-) -> "MapRun":
-    from toolkit.atomic import check_target
-    from toolkit.landmarks.database import read_map
-    from toolkit.runs.config import gather, load
-    from toolkit.runs.mapping import collect_log, solve_map, write_log
+def _build(logs: list[Path], map_file: Path, prior: Path | None, output: Path | None, given: Given) -> "MapRun":
+    from toolkit.runs.mapping import MapTask, build_map
     from toolkit.runs.outputs import output_files
-    from toolkit.stage import Reduction
-    from toolkit.stages import find_stage
 
-    stage = find_stage("build_map")
-    assert isinstance(stage, Reduction)  # noqa: S101 - build_map is the one reduction
-    config = load("build_map", gather(*configured))
-    check_target(map_file)
     targets = output_files(logs, output) if output else {}
-    collected = []
-    for log in logs:
-        with progress(f"read {log.name}", log.stat().st_size if log.is_file() else None) as advance:
-            collected.append(collect_log(stage, config, log, span, advance))
-    with progress("solve", None, "steps"):
-        run = solve_map(stage, config, collected, read_map(prior) if prior else None, map_file)
-    for index, target in enumerate(targets.values()):
-        write_log(stage, config, run, index, span, target, results_only=results_only)
-    return run
+    return build_map(MapTask(tuple(given.requests(logs)), map_file, targets, prior), progress)
 
 
 def _from_reference(logs: list[Path], map_file: Path, json: bool) -> None:
-    from toolkit.runs.mapping import map_from_reference
+    from toolkit.runs.reference_map import map_from_reference
 
     if len(logs) != 1:
         raise UsageError("--from-reference takes one log")
@@ -98,30 +83,43 @@ def _from_reference(logs: list[Path], map_file: Path, json: bool) -> None:
         say(f"{map_file}: {len(landmark_map)} surveyed landmarks from {logs[0]}")
 
 
+def _stages(run: "MapRun", log: "MappedLog") -> "list[StageRun]":
+    """What every stage did for a log, its share in the map included."""
+    import dataclasses
+
+    return [*log.stages, dataclasses.replace(run.build, outcome=log.outcome)]
+
+
 def _document(run: "MapRun", map_file: Path) -> dict[str, object]:
     tentative = int(run.landmark_map.tentative.sum())
+    states: dict[str, str] = {}
+    for log in run.logs:
+        for stage in _stages(run, log):
+            states[stage.stage] = "ran" if "ran" in {stage.state, states.get(stage.stage)} else "reused"
     return {
         "database": str(map_file),
         "landmarks": len(run.landmark_map) - tentative,
         "tentative": tentative,
         "logs": [
             {
-                "path": str(log.path),
+                "path": str(log.recording),
                 "fingerprint": log.fingerprint,
                 "bundles": source.bundles,
                 "used": source.used,
-                "dropped": log.reading.notes(),
-                "losses": log.reading.losses,
+                **told(_stages(run, log)),
+                "losses": list(log.outcome.losses),
             }
-            for log, source in zip(run.logs, run.landmark_map.sources[-len(run.logs) :], strict=True)
+            for log, source in zip(run.logs, run.sources, strict=True)
         ],
-        "stages": {"build_map": "ran"},
+        "stages": states,
     }
 
 
 def _print(run: "MapRun", map_file: Path) -> None:
     tentative = int(run.landmark_map.tentative.sum())
     say(f"{map_file}: {len(run.landmark_map) - tentative} landmarks, {tentative} tentative")
-    sources = run.landmark_map.sources[-len(run.logs) :]
-    rows = [[str(log.path), str(s.bundles), str(s.used)] for log, s in zip(run.logs, sources, strict=True)]
+    rows = [
+        [str(log.recording), str(source.bundles), str(source.used)]
+        for log, source in zip(run.logs, run.sources, strict=True)
+    ]
     table(["log", "bundles", "used"], rows)

@@ -11,6 +11,7 @@ from toolkit.errors import UsageError
 
 if TYPE_CHECKING:
     from toolkit.runs.bundles import Span
+    from toolkit.runs.thinning import Thinning
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of text.")]
 Output = Annotated[
@@ -26,6 +27,20 @@ End = Annotated[str | None, typer.Option("--end", help="Log time to stop before:
 Remap = Annotated[list[str] | None, typer.Option("--remap", metavar="FROM=TO", help="Read topic FROM as TO.")]
 OdometryTopic = Annotated[str | None, typer.Option("--odom", help="Odometry topic, where the log has several.")]
 ImageTopic = Annotated[str | None, typer.Option("--image", help="Image topic, where the log has several.")]
+ScanTopic = Annotated[str | None, typer.Option("--scan", help="Scan topic, where the log has several.")]
+ImageRate = Annotated[
+    float | None, typer.Option("--image-rate", metavar="HZ", help="Leave out images that come faster than this.")
+]
+Every = Annotated[
+    str | None,
+    typer.Option("--every", metavar="0.2m,5deg", help="Leave out images until the robot moved or turned so far."),
+]
+Model = Annotated[Path | None, typer.Option("--model", help="Detector: any YOLOv5 export (ONNX).")]
+Names = Annotated[Path | None, typer.Option("--names", help="Class names, one per line, where the model has none.")]
+Extrinsics = Annotated[
+    Path | None, typer.Option("--extrinsics", help="Where the sensors are on the robot, if the log does not say.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Run every stage anew, also where its results are there.")]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="TOML file with one table per stage.")]
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="STAGE.KEY=VALUE", help="One setting; repeatable.")
@@ -44,6 +59,17 @@ def span(start: str | None, end: str | None, remaps: list[str] | None, topics: d
 
     chosen = {role: topic for role, topic in topics.items() if topic}
     return Span(Choice(chosen, parse_remaps(remaps or [])), time_ns(start, "--start"), time_ns(end, "--end"))
+
+
+def thinning(rate_hz: float | None, every: str | None) -> "Thinning":
+    """Which images are left out.
+
+    Raises:
+        UsageError: an option cannot be read.
+    """
+    from toolkit.runs.thinning import parse_thinning
+
+    return parse_thinning(rate_hz, every)
 
 
 def time_ns(text: str | None, option: str) -> int | None:

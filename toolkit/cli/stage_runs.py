@@ -1,6 +1,7 @@
-"""What the verbs that run one stage over logs share: the runs themselves, notes, documents, exit codes."""
+"""What the verbs that run stages over logs share: the runs themselves, notes, documents, exit codes."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,45 +10,61 @@ import typer
 from toolkit.cli.console import PARTIAL, progress, say_json, warn
 
 if TYPE_CHECKING:
+    from toolkit.runs.bench import StageRun
     from toolkit.runs.bundles import Span
-    from toolkit.runs.pipeline import StageRun
+    from toolkit.runs.pipeline import LogRun
+    from toolkit.runs.plan import Request
+    from toolkit.runs.thinning import Thinning
 
 Configured = tuple[Path | None, list[str] | None, str | None]
 """The options --config, --set and --method."""
 
 
-def run_over(
-    name: str,
-    logs: Sequence[Path],
-    output: Path,
-    configured: Configured,
-    files: Mapping[str, Path | None],
-    span: "Span",
-    results_only: bool,
-) -> "list[StageRun]":
-    """Run a stage over every log; `files` are the resources that options gave."""
-    from toolkit.runs.config import gather, load_files
-    from toolkit.runs.outputs import output_files
-    from toolkit.runs.pipeline import Job, run_stage
-    from toolkit.stage import Stage
-    from toolkit.stages import find_stage
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What the options of a verb say about all its logs; `files` are those that options gave, by resource name."""
 
-    stage = find_stage(name)
-    assert isinstance(stage, Stage)  # noqa: S101 - a verb of a reduction does not come here
-    config_file, settings, method = configured
-    config, resources = load_files(stage, gather(config_file, settings or [], method), files)
-    runs = []
-    for log, target in output_files(logs, output).items():
-        with progress(f"{name} {log.name}", log.stat().st_size if log.is_file() else None) as advance:
-            runs.append(run_stage(stage, config, Job(log, target, resources, span, results_only), advance))
-    return runs
+    configured: Configured
+    span: "Span"
+    files: Mapping[str, Path | None] = field(default_factory=dict)
+    thinning: "Thinning | None" = None
+    results_only: bool = False
+    force: bool = False
+
+    def requests(self, logs: Sequence[Path]) -> "list[Request]":
+        """What to do with each log.
+
+        Raises:
+            UsageError: a setting is wrong.
+        """
+        from toolkit.runs.config import gather
+        from toolkit.runs.plan import Request
+        from toolkit.runs.thinning import Thinning
+
+        config_file, settings, method = self.configured
+        gathered, thinning = gather(config_file, settings or [], method), self.thinning or Thinning()
+        return [Request(log, gathered, self.files, self.span, thinning, self.results_only, self.force) for log in logs]
+
+
+def run_over(
+    verb: str, names: Sequence[str], logs: Sequence[Path], output: Path, given: Given, *, lacking: bool = False
+) -> "list[LogRun]":
+    """Run stages over every log; `lacking` puts those before them that a log still lacks."""
+    from toolkit.runs.outputs import output_files
+    from toolkit.runs.pipeline import run_stages
+
+    requests = given.requests(logs)
+    targets = output_files(logs, output)
+    return [
+        run_stages(request, targets[request.recording], names, verb, progress, lacking=lacking) for request in requests
+    ]
 
 
 def finish(
     verb: str,
-    runs: "list[StageRun]",
-    document: "Callable[[StageRun], dict[str, object]]",
-    show: "Callable[[list[StageRun]], None]",
+    runs: "list[LogRun]",
+    document: "Callable[[LogRun], dict[str, object]]",
+    show: "Callable[[list[LogRun]], None]",
     json: bool,
 ) -> None:
     """Tell what happened, as one document or text; several logs are listed under `logs`.
@@ -56,25 +73,43 @@ def finish(
         typer.Exit: source data was unreadable.
     """
     for run in runs:
-        for note in run.notes:
-            warn(f"note: {note}")
-        for reason, count in run.reading.notes().items():
-            warn(f"note: {run.output}: {count} {reason}")
-        for loss in run.reading.losses:
-            warn(f"warning: {run.output}: {loss}")
+        tell(run.output, run.stages, run.notes, run.losses)
     if json:
         each = [
-            {
-                "output": str(run.output),
-                **document(run),
-                "stages": {verb: "ran"},
-                "dropped": run.reading.notes(),
-                "losses": run.reading.losses,
-            }
-            for run in runs
+            {"output": str(run.output), **document(run), **told(run.stages), "losses": list(run.losses)} for run in runs
         ]
         say_json(verb, each[0] if len(each) == 1 else {"logs": each})
     else:
         show(runs)
-    if any(run.reading.losses for run in runs):
+    if any(run.losses for run in runs):
         raise typer.Exit(PARTIAL)
+
+
+def tell(path: Path, stages: "Sequence[StageRun]", notes: Sequence[str], losses: Sequence[str]) -> None:
+    """What every stage did and why, what was left out and what was lost, on stderr."""
+    for run in stages:
+        warn(f"{path}: {run.stage} {run.state}: {run.reason}")
+    for note in notes:
+        warn(f"note: {path}: {note}")
+    for reason, count in dropped(stages).items():
+        warn(f"note: {path}: {count} {reason}")
+    for loss in losses:
+        warn(f"warning: {path}: {loss}")
+
+
+def told(stages: "Sequence[StageRun]") -> dict[str, object]:
+    """The part of a document that says what every stage did, and what was left out."""
+    return {
+        "stages": {run.stage: run.state for run in stages},
+        "reasons": {run.stage: run.reason for run in stages},
+        "dropped": dropped(stages),
+    }
+
+
+def dropped(stages: "Sequence[StageRun]") -> dict[str, int]:
+    """What stages left out by rule, in words, with its count; what an earlier stage than the last did names it."""
+    found: dict[str, int] = {}
+    for run in stages:
+        of_stage = "" if run is stages[-1] else f" ({run.stage})"
+        found.update({f"{reason}{of_stage}": count for reason, count in run.outcome.dropped.items()})
+    return found

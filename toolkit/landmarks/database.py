@@ -2,7 +2,7 @@
 
 import contextlib
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from urllib.parse import quote
 
@@ -34,8 +34,21 @@ def read_map(path: Path) -> LandmarkMap:
         raise MapError(f"{path}: is not a landmark database or is damaged ({error}); build it again") from error
 
 
-def write_map(path: Path, landmark_map: LandmarkMap) -> None:
+def read_manifest(path: Path) -> dict[str, str]:
+    """What ran to build the map in a database, by entry; nothing if that is unknown, or there is no such map."""
+    if not path.is_file():
+        return {}
+    try:
+        with _reading(path) as database:
+            return dict(database.execute("SELECT name, content FROM manifest").fetchall())
+    except sqlite3.Error:
+        return {}
+
+
+def write_map(path: Path, landmark_map: LandmarkMap, manifest: Mapping[str, str] | None = None) -> None:
     """Write a map to a new database, or over the old one once it is whole. Same map, same bytes.
+
+    `manifest` says what ran to build it, where that is known.
 
     Raises:
         ToolkitError: the file cannot be written.
@@ -43,6 +56,7 @@ def write_map(path: Path, landmark_map: LandmarkMap) -> None:
     with contextlib.closing(sqlite3.connect(":memory:", isolation_level=None)) as database:
         database.executescript(f"BEGIN;\n{resource('schemas', 'landmarks.sql').read_text(encoding='utf-8')}")
         _write(database, landmark_map)
+        database.executemany("INSERT INTO manifest VALUES (?, ?)", sorted((manifest or {}).items()))
         database.execute("COMMIT")
         content = database.serialize()
     with atomic_file(path) as stream:

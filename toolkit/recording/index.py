@@ -14,7 +14,10 @@ from toolkit.recording.container import FOOTER_SIZE, MAGIC, RECORD, Opcode, pars
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A stretch of the file with messages: one chunk record, whole or cut by the end of the file, or loose messages."""
+    """A stretch of the file with messages: one chunk record, whole or cut by the end of the file, or loose messages.
+
+    `channel_ids` are the channels that it has messages of, None where the summary does not say.
+    """
 
     offset: int
     length: int
@@ -22,6 +25,7 @@ class Block:
     end_ns: int
     is_chunk: bool = True
     is_cut: bool = False
+    channel_ids: frozenset[int] | None = None
 
 
 @dataclass(slots=True)
@@ -111,7 +115,11 @@ def _collect(stream: BinaryIO, header: records.Header, section: bytes) -> tuple[
         elif opcode == Opcode.CHUNK_INDEX:
             chunk = parse(records.ChunkIndex, content)
             block = Block(
-                chunk.chunk_start_offset, chunk.chunk_length, chunk.message_start_time, chunk.message_end_time
+                chunk.chunk_start_offset,
+                chunk.chunk_length,
+                chunk.message_start_time,
+                chunk.message_end_time,
+                channel_ids=frozenset(chunk.message_index_offsets) or None,
             )
             index.blocks.append(block)
         elif opcode == Opcode.METADATA_INDEX:

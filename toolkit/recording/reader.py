@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import heapq
 from collections.abc import Collection, Iterator
+from functools import cached_property
 from pathlib import Path
 from struct import error as struct_error
 from typing import BinaryIO
@@ -12,7 +13,7 @@ from mcap import records
 from mcap.exceptions import McapError
 
 from toolkit.errors import RecordingError
-from toolkit.manifest import carried_fingerprint
+from toolkit.manifest import RUN, carried_fingerprint
 from toolkit.recording.blocks import DamagedBlockError, Progress, block_messages
 from toolkit.recording.container import CHUNK, MAGIC, RECORD, Opcode, parse
 from toolkit.recording.index import Block, Index, index_from_summary, read_record
@@ -89,9 +90,19 @@ class Recording:
 
     def fingerprint(self) -> str:
         """Identity by content: that of the recording whose results this one carries, else a hash over its blocks."""
-        carried = carried_fingerprint(self.metadata)
-        if carried:
-            return carried
+        return self._carried or self._content
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether the manifest belongs to the content: an output of ours that nobody edited."""
+        return self._carried is not None
+
+    @cached_property
+    def _carried(self) -> str | None:
+        return carried_fingerprint(self.metadata, self._content) if RUN in self.metadata else None
+
+    @cached_property
+    def _content(self) -> str:
         digest = hashlib.sha256()
         for block in self._index.blocks:
             self._stream.seek(block.offset)
@@ -117,14 +128,34 @@ class Recording:
 
         Holds only the chunks in memory that overlap in time. `progress` is told the bytes of each chunk that was read.
         """
-        wanted = {key: c for key, c in self._connections.items() if connections is None or c in connections}
-        first = 0 if start_ns is None else start_ns
-        last = 2**64 if end_ns is None else end_ns
-        blocks = [block for block in self._index.blocks if block.end_ns >= first and block.start_ns < last]
-        blocks.sort(key=lambda block: (block.start_ns, block.offset))
-        for message in self._merge(blocks, wanted, progress):
+        wanted, first, last = self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns
+        for message in self._merge(self._blocks(wanted, first, last), wanted, progress):
             if first <= message.log_time_ns < last:
                 yield message
+
+    def size_bytes(
+        self,
+        connections: Collection[Connection] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+    ) -> int:
+        """The bytes that `messages` reads for the same arguments: chunks without a wanted channel are passed over."""
+        blocks = self._blocks(self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns)
+        return sum(block.length for block in blocks)
+
+    def _wanted(self, connections: Collection[Connection] | None) -> dict[int, Connection]:
+        return {key: c for key, c in self._connections.items() if connections is None or c in connections}
+
+    def _blocks(self, wanted: dict[int, Connection], first_ns: int, last_ns: int) -> list[Block]:
+        """The blocks that may hold wanted messages of those times, by their start."""
+        blocks = [
+            block
+            for block in self._index.blocks
+            if block.end_ns >= first_ns
+            and block.start_ns < last_ns
+            and (block.channel_ids is None or not block.channel_ids.isdisjoint(wanted))
+        ]
+        return sorted(blocks, key=lambda block: (block.start_ns, block.offset))
 
     def _load(self, block: Block, wanted: dict[int, Connection], progress: Progress | None) -> list[RawMessage]:
         try:

@@ -1,6 +1,7 @@
 """Write recordings: chunked, indexed, checksummed, and whole or not at all."""
 
 import contextlib
+import hashlib
 import zlib
 from array import array
 from collections.abc import Iterator, Mapping
@@ -13,10 +14,11 @@ from zstandard import ZstdCompressor
 
 from toolkit.atomic import atomic_file
 from toolkit.errors import RecordingError
+from toolkit.manifest import CONTENT, RUN, STAGE, content_entry
 from toolkit.messages.codec import encode
 from toolkit.messages.qos import KEY, qos_profile
 from toolkit.messages.typestore import definition
-from toolkit.recording.container import MAGIC, MESSAGE, MESSAGE_FIXED, Opcode, serialize
+from toolkit.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, Opcode, serialize
 from toolkit.recording.summary import summary_section
 from toolkit.stage import Channel, Connection, RawMessage, Stamped
 
@@ -57,9 +59,9 @@ class _Chunk:
 class RecordingWriter:
     """Writes one recording to a stream; made by `create_recording`.
 
-    Every image channel gets uncompressed chunks of its own; the others share zstd chunks with their `group`, so that
-    results of one stage lie together. A chunk ends after 1 MiB or 5 s. What `metadata` holds when the file is finished
-    goes into it, one record per name.
+    Every image channel gets uncompressed chunks of its own; the others share zstd chunks, results with those of their
+    stage. A chunk ends after 1 MiB or 5 s. What `metadata` holds when the file is finished goes into it, one record per
+    name; a manifest with a fingerprint is bound to the content.
     """
 
     def __init__(self, stream: BinaryIO) -> None:
@@ -68,17 +70,18 @@ class RecordingWriter:
         self._stream = stream
         self._offset = self._crc = 0
         self._connections: dict[Connection, tuple[int, str]] = {}
-        self._own: dict[str, Connection] = {}
+        self._own: dict[tuple[str, str], Connection] = {}
         self._schemas: dict[tuple[str, str, bytes], records.Schema] = {}
         self._channels: list[records.Channel] = []
         self._message_counts: dict[int, int] = {}
         self._chunks: dict[str, _Chunk] = {}
         self._chunk_indexes: list[records.ChunkIndex] = []
         self._attachments: list[records.AttachmentIndex] = []
+        self._content = hashlib.sha256()
         self._compressor = ZstdCompressor(level=3)
         self._put(MAGIC + serialize(records.Header(profile="ros2", library="mcap-landmarks")))
 
-    def declare(self, connection: Connection, group: str = "") -> None:
+    def declare(self, connection: Connection) -> None:
         """Give a connection its channel, also if no message of it comes."""
         if connection in self._connections:
             return
@@ -103,13 +106,14 @@ class RecordingWriter:
         self._channels.append(channel)
         self._message_counts[channel.id] = 0
         self.counts.setdefault(connection.topic, 0)
-        group = f"image {channel.id}" if connection.message_type in _IMAGE_TYPES else group
+        own = connection.metadata.get(STAGE, "")
+        group = f"image {channel.id}" if connection.message_type in _IMAGE_TYPES else own
         self._connections[connection] = (channel.id, group)
 
-    def write(self, raw: RawMessage, group: str = "") -> None:
+    def write(self, raw: RawMessage) -> None:
         """Write a message as it is, on the channel of its connection."""
         if raw.connection not in self._connections:
-            self.declare(raw.connection, group)
+            self.declare(raw.connection)
         channel_id, group = self._connections[raw.connection]
         chunk = self._chunks.get(group)
         if chunk is None:
@@ -133,22 +137,22 @@ class RecordingWriter:
             if group in self._chunks:
                 self._flush(self._chunks.pop(group))
 
-    def add(self, stamped: Stamped, group: str = "") -> None:
-        """Encode a message of ours and write it; it is published when it is logged."""
-        connection = self.connection(stamped.channel)
+    def add(self, stamped: Stamped, stage: str = "") -> None:
+        """Encode a message of ours, a result of `stage` if it is one, and write it; it is published when logged."""
+        connection = self.connection(stamped.channel, stage)
         sequence = self.counts.get(connection.topic, 0)
         time_ns = stamped.log_time_ns
-        self.write(RawMessage(connection, time_ns, time_ns, sequence, encode(stamped.message)), group)
+        self.write(RawMessage(connection, time_ns, time_ns, sequence, encode(stamped.message)))
 
-    def connection(self, channel: Channel[Any]) -> Connection:
-        """The connection that messages of a channel of ours go to."""
-        if channel.topic not in self._own:
+    def connection(self, channel: Channel[Any], stage: str = "") -> Connection:
+        """The connection that messages of a channel of ours go to; that of results names their stage."""
+        if (channel.topic, stage) not in self._own:
             ros_type = channel.message.ROS_TYPE
-            qos = qos_profile(latched=channel.topic in _LATCHED)
-            self._own[channel.topic] = Connection(
-                channel.topic, ros_type, definition(ros_type).encode(), metadata={KEY: qos}
+            metadata = {KEY: qos_profile(latched=channel.topic in _LATCHED)} | ({STAGE: stage} if stage else {})
+            self._own[channel.topic, stage] = Connection(
+                channel.topic, ros_type, definition(ros_type).encode(), metadata=metadata
             )
-        return self._own[channel.topic]
+        return self._own[channel.topic, stage]
 
     def attach(self, attachment: records.Attachment) -> None:
         """Carry an attachment over from another recording."""
@@ -170,6 +174,8 @@ class RecordingWriter:
         """Write what is left, the metadata and the summary; afterwards the file is complete."""
         for group in sorted(self._chunks, key=lambda name: self._chunks[name].start_ns):
             self._flush(self._chunks[group])
+        if "fingerprint" in self.metadata.get(RUN, {}):
+            self.metadata[RUN][CONTENT] = content_entry(self._content.hexdigest())
         metadata_indexes = []
         for name, entries in sorted(self.metadata.items()):
             data = serialize(records.Metadata(name=name, metadata=dict(sorted(entries.items()))))
@@ -210,6 +216,9 @@ class RecordingWriter:
             uncompressed_size=len(chunk.data),
         )
         start = self._offset
+        self._content.update(
+            CHUNK.pack(chunk.start_ns, chunk.end_ns, record.uncompressed_size, record.uncompressed_crc)
+        )
         self._put(serialize(record))
         length, offsets = self._offset - start, {}
         for channel_id, entries in sorted(chunk.index.items()):

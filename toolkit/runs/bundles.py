@@ -12,9 +12,9 @@ from toolkit.messages.codec import Message, decode
 from toolkit.messages.scene import SceneObjects
 from toolkit.messages.transforms import TFMessage
 from toolkit.recording.association import Association, associate
-from toolkit.recording.reader import Recording
 from toolkit.recording.trail import odometry_from
 from toolkit.runs.inputs import ROLES, Choice, choose, message_type
+from toolkit.runs.view import Readable
 from toolkit.stage import Bundle, Channel, Connection, RawMessage
 
 HELD = (CAMERA_INFO, TF_STATIC)
@@ -69,7 +69,7 @@ class Reading:
 
 
 def inputs_of(
-    recording: Recording, reads: Iterable[Channel[Any]], required: Iterable[Channel[Any]], choice: Choice
+    recording: Readable, reads: Iterable[Channel[Any]], required: Iterable[Channel[Any]], choice: Choice
 ) -> dict[Connection, Channel[Any]]:
     """The connections that a stage reads, each with the channel it stands for.
 
@@ -89,7 +89,7 @@ def inputs_of(
     return found
 
 
-def _missing(recording: Recording, channel: Channel[Any], empty: bool) -> str:
+def _missing(recording: Readable, channel: Channel[Any], empty: bool) -> str:
     role = ROLES.get(channel)
     if empty:
         name = role.name if role else channel.topic
@@ -132,7 +132,7 @@ def read_bundles(
 
 
 def held_before(
-    recording: Recording, inputs: Mapping[Connection, Channel[Any]], start_ns: int | None
+    recording: Readable, inputs: Mapping[Connection, Channel[Any]], start_ns: int | None
 ) -> Iterator[RawMessage]:
     """Messages of held inputs from before the time that reading starts at: transforms most often come only once."""
     held = [connection for connection, channel in inputs.items() if channel in HELD]

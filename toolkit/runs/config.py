@@ -1,5 +1,6 @@
 """The configuration of all stages: a TOML file, single settings, and what they mean for each stage."""
 
+import contextlib
 import dataclasses
 import difflib
 import tomllib
@@ -9,7 +10,8 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from toolkit.errors import UsageError
+from toolkit.errors import ToolkitError, UsageError
+from toolkit.resources import detector
 from toolkit.sources import source_names
 from toolkit.stage import Stage
 from toolkit.stages import find_stage, stage_names
@@ -89,15 +91,21 @@ def load_files(stage: Stage, settings: Settings, given: Mapping[str, Path | None
     Raises:
         UsageError: a file that the stage cannot do without is not given.
     """
-    own = dict(settings.get(stage.name, {}))
-    files = {name: Path(str(own.pop(name))) for name in (*stage.resources, *stage.options) if name in own}
-    files.update({name: path for name, path in given.items() if path is not None})
+    own, kinds = dict(settings.get(stage.name, {})), (*stage.resources, *stage.options)
+    files = {name: Path(str(own.pop(name))) for name in kinds if name in own}
+    files.update({name: path for name, path in given.items() if path is not None and name in kinds})
     for name in stage.resources:
         if name not in files:
-            raise UsageError(
-                f"{stage.name} needs a {name} and none is bundled; give --{name} FILE or --set {stage.name}.{name}=FILE"
-            )
+            files[name] = _bundled(stage.name, name)
     return stage_config(stage.config, stage.name, own), files
+
+
+def _bundled(stage: str, name: str) -> Path:
+    """The file that travels with the program, where the user gives none."""
+    if (stage, name) == ("detect", "model"):
+        with contextlib.suppress(ToolkitError):
+            return detector()
+    raise UsageError(f"{stage} needs a {name} and none is bundled; give --{name} FILE or --set {stage}.{name}=FILE")
 
 
 def load(name: str, settings: Settings) -> Any:

@@ -13,7 +13,7 @@ from toolkit.messages.poses import Odometry, PoseStamped
 from toolkit.messages.scan import LaserScan
 from toolkit.messages.scene import SceneObjects
 from toolkit.messages.transforms import TFMessage
-from toolkit.recording.reader import Recording
+from toolkit.runs.view import Readable
 from toolkit.stage import Channel, Connection
 
 OWN_OBJECTS = frozenset({"/landmarks/scan_objects", channels.MAP.topic, channels.TRUTH_OBJECTS.topic})
@@ -83,7 +83,7 @@ def topics_for(role: Role, present: Collection[tuple[str, str]]) -> list[str]:
     return [topic for topic in fitting if not topic.startswith("/landmarks/")]
 
 
-def choose(recording: Recording, channel: Channel[Any], choice: Choice) -> tuple[Connection, ...]:
+def choose(recording: Readable, channel: Channel[Any], choice: Choice) -> tuple[Connection, ...]:
     """The connections that a role is read from, none if the recording has no such topic.
 
     Raises:
@@ -126,7 +126,7 @@ def message_type(channel: Channel[Any], connection: Connection) -> type[Message]
     return next(iter(fitting), channel.message)
 
 
-def beside_camera_info(recording: Recording, channel: Channel[Any], image: Connection) -> Channel[Any]:
+def beside_camera_info(recording: Readable, channel: Channel[Any], image: Connection) -> Channel[Any]:
     """A channel moved into the namespace of an image's camera, where Foxglove looks for annotations.
 
     That is the parent of the CameraInfo topic that shares most of the image's path, else of the image topic.

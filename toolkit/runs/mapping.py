@@ -1,120 +1,225 @@
 """Build one landmark map from many logs, and write each log with its results where asked."""
 
 import dataclasses
+import json
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from toolkit.channels import MAP_MARKERS, MAP_PATH, MAP_POSE, ODOMETRY, SCENE_OBJECTS, TRUTH_OBJECTS
-from toolkit.errors import MapError, RecordingError
-from toolkit.landmarks.database import write_map
+from toolkit.atomic import check_target
+from toolkit.channels import MAP_MARKERS, MAP_PATH, MAP_POSE
+from toolkit.errors import RecordingError
+from toolkit.landmarks.database import read_manifest, read_map, write_map
 from toolkit.landmarks.markers import markers_from_map
 from toolkit.landmarks.model import LandmarkMap, Source
 from toolkit.landmarks.observations import LogObservations, Trajectory
-from toolkit.landmarks.scene import map_from_scene
-from toolkit.manifest import RUN, Manifest
-from toolkit.messages.codec import decode
+from toolkit.manifest import RUN, Manifest, Outcome, StageRecord, stage_records
 from toolkit.messages.poses import Path as PathMessage
 from toolkit.messages.poses import PoseStamped
-from toolkit.recording.blocks import Progress
-from toolkit.recording.reader import Recording, open_recording
 from toolkit.recording.writer import create_recording
-from toolkit.runs.bundles import Reading, Span, inputs_of, read_bundles
-from toolkit.runs.config import effective
-from toolkit.stage import RawMessage, Reduction, Stamped
+from toolkit.runs.assembly import assemble
+from toolkit.runs.bench import Bench, StageRun, Watch, open_bench, parts_folder, unwatched
+from toolkit.runs.bundles import Reading, inputs_of, read_bundles
+from toolkit.runs.config import load
+from toolkit.runs.pipeline import check_output, told
+from toolkit.runs.plan import Request, Step, choice_options, inputs_of_stage, missing_stages, plan, record_of
+from toolkit.runs.step import outcome_of
+from toolkit.stage import Reduction, Stamped
+from toolkit.stages import find_stage
 
-Watch = Mapping[Path, AbstractContextManager[Progress]]
+_LOGS = "logs"
+"""The manifest's option with what came of each log."""
 
 
-@dataclass(slots=True)
-class LogRun:
-    """One log on its way into a map."""
+@dataclass(frozen=True, slots=True)
+class MapTask:
+    """The logs of a map (their settings are the first one's), the database, each log's output, a map to extend."""
 
-    path: Path
-    reading: Reading
-    observations: LogObservations
+    requests: tuple[Request, ...]
+    database: Path
+    outputs: Mapping[Path, Path] = field(default_factory=dict)
+    prior: Path | None = None
+
+    @property
+    def files(self) -> dict[str, Path]:
+        """The files that the map is made with."""
+        return {"prior": self.prior} if self.prior is not None else {}
+
+
+@dataclass(frozen=True, slots=True)
+class MappedLog:
+    """What became of one log on its way into a map; `outcome` counts its bundles and all that was lost."""
+
+    recording: Path
     fingerprint: str
+    stages: tuple[StageRun, ...]
+    outcome: Outcome
+    notes: tuple[str, ...] = ()
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class MapRun:
-    """The map and what became of each log."""
+    """The map, what became of it, and what became of each log."""
 
     landmark_map: LandmarkMap
-    logs: list[LogRun] = field(default_factory=list)
-    trajectories: list[Trajectory] = field(default_factory=list)
-    losses: list[str] = field(default_factory=list)
+    build: StageRun
+    logs: tuple[MappedLog, ...]
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """What the map says of the logs, in their order."""
+        return self.landmark_map.sources[len(self.landmark_map.sources) - len(self.logs) :]
 
 
-def collect_log(stage: Reduction, config: Any, path: Path, span: Span, progress: Progress | None = None) -> LogRun:
+@dataclass(frozen=True, slots=True)
+class _LogPlan:
+    """One log on its way: its steps up to the scene objects, and what the map will read of it."""
+
+    request: Request
+    fingerprint: str
+    steps: tuple[Step, ...]
+    record: StageRecord
+
+
+def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
+    """Build a map of logs, after the stages that they lack; what is there already is reused.
+
+    Raises:
+        ToolkitError: a log or file cannot be used, or what was seen is not enough for a map.
+    """
+    stage, config = _reduction(), load("build_map", task.requests[0].settings)
+    check_target(task.database)
+    for recording, output in task.outputs.items():
+        check_output(recording, output)
+    with parts_folder(task.database) as parts:
+        plans = [_plan_log(stage, config, request, task, parts) for request in task.requests]
+        inputs = {f"log {i + 1}": entry.record.key for i, entry in enumerate(plans)}
+        record = record_of(stage, config, task.files, inputs, {})
+        run = None if task.requests[0].force else _found(task, plans, record, parts)
+        if run is None:
+            run = _build(stage, config, task, plans, record, parts, watch)
+        for entry in plans:
+            if entry.request.recording in task.outputs:
+                _write_log(task, plans, entry, record, parts, watch)
+    return run
+
+
+def _reduction() -> Reduction:
+    stage = find_stage("build_map")
+    assert isinstance(stage, Reduction)  # noqa: S101 - build_map is the one reduction
+    return stage
+
+
+def _plan_log(stage: Reduction, config: Any, request: Request, task: MapTask, parts: Path) -> _LogPlan:
+    with open_bench(request, parts, None) as bench:
+        steps = tuple(plan(request, bench.log, missing_stages(stage, bench.log)))
+        options = choice_options(request.span.choice, stage.reads)
+        record = record_of(stage, config, task.files, inputs_of_stage(stage, bench.log, steps), options)
+        return _LogPlan(request, bench.log.recording.fingerprint(), steps, record)
+
+
+def _share(entry: _LogPlan, record: StageRecord) -> StageRecord:
+    """The record of one log's share in the map that another record is of."""
+    return dataclasses.replace(entry.record, inputs={**entry.record.inputs, "map": record.key})
+
+
+def _found(task: MapTask, plans: Sequence[_LogPlan], record: StageRecord, parts: Path) -> MapRun | None:
+    """The run that made the database, if it is the one that is asked for and left its results in all outputs."""
+    entries = read_manifest(task.database)
+    if _why(entries, record):
+        return None
+    for entry in plans:
+        output = task.outputs.get(entry.request.recording)
+        if output is not None:
+            with open_bench(entry.request, parts, output) as bench:
+                if bench.find(_share(entry, record)) is None:
+                    return None
+    outcomes = [Outcome.of(outcome) for outcome in json.loads(entries["options"])[_LOGS]]
+    reason = "the map was made from the same logs, files and settings"
+    logs = tuple(
+        MappedLog(
+            entry.request.recording,
+            entry.fingerprint,
+            tuple(StageRun(step.stage.name, "reused", reason, Outcome()) for step in entry.steps),
+            outcome,
+            outcome.notes,
+        )
+        for entry, outcome in zip(plans, outcomes, strict=True)
+    )
+    return MapRun(read_map(task.database), StageRun(record.stage, "reused", reason, Outcome()), logs)
+
+
+def _why(entries: Mapping[str, str], record: StageRecord) -> str:
+    """Why the map has to be built, in words, from the manifest of the one that is there; empty if it need not be."""
+    earlier = stage_records({RUN: entries}).get(record.stage)
+    return "there was no such map" if earlier is None else record.difference(earlier)
+
+
+def _build(
+    stage: Reduction,
+    config: Any,
+    task: MapTask,
+    plans: Sequence[_LogPlan],
+    record: StageRecord,
+    parts: Path,
+    watch: Watch,
+) -> MapRun:
+    """Run what is missing, gather what every log saw, solve, and write the database."""
+    reason = "--force" if task.requests[0].force else _why(read_manifest(task.database), record)
+    reason = reason or "an output has no results of it"
+    logs, observations = [], []
+    for entry in plans:
+        with open_bench(entry.request, parts, task.outputs.get(entry.request.recording)) as bench:
+            runs = [bench.work(step, watch) for step in entry.steps]
+            found, outcome = _collect(stage, config, bench, entry, watch)
+        notes, losses = told([*runs, StageRun(stage.name, "ran", reason, outcome)], [], [])
+        outcome = dataclasses.replace(outcome, losses=losses, notes=notes)
+        observations.append(found)
+        logs.append(MappedLog(entry.request.recording, entry.fingerprint, tuple(runs), outcome, notes))
+    with watch("solve", None):
+        prior = read_map(task.prior) if task.prior is not None else None
+        landmark_map, trajectories = stage.solve(observations, prior, config)
+    for entry, trajectory in zip(plans, trajectories, strict=True):
+        if entry.request.recording in task.outputs:
+            _write_part(_share(entry, record), landmark_map, trajectory, parts)
+    outcomes = {_LOGS: [log.outcome.entry() for log in logs]}
+    fingerprints = tuple(log.fingerprint for log in logs)
+    manifest = Manifest("map", inputs=fingerprints, options=outcomes, stages=(record,))
+    write_map(task.database, landmark_map, manifest.entries())
+    return MapRun(landmark_map, StageRun(stage.name, "ran", reason, Outcome()), tuple(logs))
+
+
+def _collect(
+    stage: Reduction, config: Any, bench: Bench, entry: _LogPlan, watch: Watch
+) -> tuple[LogObservations, Outcome]:
     """Observations of one log.
 
     Raises:
         RecordingError: it has no scene objects or no odometry, or none of its bundles has odometry.
-        UsageError: several topics fit.
     """
-    reading = Reading()
-    with open_recording(path) as recording:
-        inputs = inputs_of(recording, stage.reads, (SCENE_OBJECTS, ODOMETRY), span.choice)
-        raws = recording.messages(tuple(inputs), span.start_ns, span.end_ns, progress)
+    span, reading, view = bench.request.span, Reading(), bench.view(entry.record)
+    inputs = inputs_of(view, stage.reads, stage.reads, span.choice)
+    size = view.size_bytes(tuple(inputs), span.start_ns, span.end_ns)
+    with watch(f"read {view.path.name}", size) as progress:
+        raws = view.messages(tuple(inputs), span.start_ns, span.end_ns, progress)
         observations = stage.collect(read_bundles(raws, inputs, stage.reads, reading), config)
-        reading.close(recording.losses)
-        fingerprint = recording.fingerprint()
+    reading.close(view.losses)
     if not len(observations.stamps_ns):
         raise RecordingError(
-            f"{path}: none of {observations.bundles} bundles has odometry within 2 s; check that the clocks of "
+            f"{view.path}: none of {observations.bundles} bundles has odometry within 2 s; check that the clocks of "
             "odometry and scene objects agree"
         )
-    observations = dataclasses.replace(observations, fingerprint=fingerprint)
-    return LogRun(path, reading, observations, fingerprint)
+    return dataclasses.replace(observations, fingerprint=entry.fingerprint), outcome_of(reading)
 
 
-def solve_map(stage: Reduction, config: Any, logs: Sequence[LogRun], prior: LandmarkMap | None, target: Path) -> MapRun:
-    """Solve, and write the database.
-
-    Raises:
-        MapError: what was seen is not enough for a map.
-    """
-    landmark_map, trajectories = stage.solve([log.observations for log in logs], prior, config)
-    write_map(target, landmark_map)
-    return MapRun(landmark_map, list(logs), trajectories)
-
-
-def write_log(
-    stage: Reduction,
-    config: Any,
-    run: MapRun,
-    index: int,
-    span: Span,
-    output: Path,
-    *,
-    results_only: bool,
-) -> None:
-    """One log with its trajectory and the map as new channels."""
-    log, trajectory = run.logs[index], run.trajectories[index]
-    with open_recording(log.path) as recording:
-        manifest = Manifest(
-            verb="map",
-            config={stage.name: effective(config)},
-            inputs=tuple(entry.fingerprint for entry in run.logs),
-            fingerprint=log.fingerprint,
-        )
-        writes = {channel.topic for channel in stage.writes}
-        kept = [entry.connection for entry in recording.channels if entry.connection.topic not in writes]
-        with create_recording(output, {**recording.metadata, RUN: manifest.entries()}) as writer:
-            if not results_only:
-                for connection in kept:
-                    writer.declare(connection)
-            raws = iter(()) if results_only else recording.messages(kept, span.start_ns, span.end_ns)
-            for item in _by_time(raws, _results(run.landmark_map, trajectory)):
-                if isinstance(item, Stamped):
-                    writer.add(item, group=stage.name)
-                else:
-                    writer.write(item)
-            for attachment in () if results_only else recording.attachments():
-                writer.attach(attachment)
+def _write_part(record: StageRecord, landmark_map: LandmarkMap, trajectory: Trajectory, parts: Path) -> None:
+    """One log's results of the map as a recording of their own."""
+    parts.mkdir(exist_ok=True)
+    with create_recording(parts / record.file_name) as writer:
+        for stamped in _results(landmark_map, trajectory):
+            writer.add(stamped, record.stage)
+        writer.metadata[RUN] = Manifest("part", fingerprint=record.key, stages=(record,)).entries()
 
 
 def _results(landmark_map: LandmarkMap, trajectory: Trajectory) -> Iterator[Stamped]:
@@ -130,36 +235,14 @@ def _results(landmark_map: LandmarkMap, trajectory: Trajectory) -> Iterator[Stam
         yield Stamped(MAP_POSE, int(log_time_ns), pose)
 
 
-def _by_time(raws: Iterator[RawMessage], results: Iterator[Stamped]) -> Iterator[RawMessage | Stamped]:
-    """Both streams by log time; at equal times the recording's own messages come first."""
-    result = next(results, None)
-    for raw in raws:
-        while result is not None and result.log_time_ns < raw.log_time_ns:
-            yield result
-            result = next(results, None)
-        yield raw
-    while result is not None:
-        yield result
-        result = next(results, None)
-
-
-def map_from_reference(path: Path, target: Path) -> LandmarkMap:
-    """The surveyed map that a log's `/ground_truth/objects` gives, written as a database.
-
-    Raises:
-        MapError: the log has no such message.
-    """
-    with open_recording(path) as recording:
-        raw = _first(recording)
-        if raw is None:
-            raise MapError(
-                f"{path}: there are no {TRUTH_OBJECTS.topic}; build the map from the log without --from-reference"
-            )
-        scene = decode(TRUTH_OBJECTS.message, raw.data)
-        landmark_map = map_from_scene(scene, Source("reference", recording.fingerprint()))
-    write_map(target, landmark_map)
-    return landmark_map
-
-
-def _first(recording: Recording) -> RawMessage | None:
-    return next(recording.messages(recording.connections(TRUTH_OBJECTS.topic)), None)
+def _write_log(
+    task: MapTask, plans: Sequence[_LogPlan], entry: _LogPlan, record: StageRecord, parts: Path, watch: Watch
+) -> None:
+    """One log with all its results."""
+    output = task.outputs[entry.request.recording]
+    with open_bench(entry.request, parts, output) as bench:
+        for step in entry.steps:
+            if bench.find(step.record) is None:
+                bench.work(step, watch)
+        bench.find(_share(entry, record))
+        assemble(bench, output, "map", [other.fingerprint for other in plans], watch)

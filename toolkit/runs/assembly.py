@@ -1,0 +1,82 @@
+"""The output of a run: a log's own messages with the results of all stages, each stage's in chunks of its own."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from toolkit.manifest import CONTENT, RUN, STAGE, Manifest, narrowed
+from toolkit.recording.reader import Recording
+from toolkit.recording.writer import RecordingWriter, create_recording
+from toolkit.runs.bench import Bench, Watch
+from toolkit.runs.view import Layer, View, own_layer
+from toolkit.stage import Connection
+
+
+def assemble(bench: Bench, output: Path, verb: str, inputs: Sequence[str], watch: Watch) -> list[str]:
+    """Write the output, unless it is there already, and tell what the log's losses are and what was left out.
+
+    `inputs` are the fingerprints of all recordings that the results were made from.
+
+    Raises:
+        ToolkitError: the output cannot be written; nothing is left behind.
+    """
+    results, stale = bench.kept_results()
+    notes = [f"{name}'s results in the log were made from results that changed; they are left out" for name in stale]
+    request, source = bench.request, bench.log.recording
+    fingerprint = narrowed(bench.log.fingerprint, results_only=request.results_only)
+    records = tuple(layer.record for layer in results if layer.record is not None)
+    manifest = Manifest(verb, inputs=tuple(inputs), options=request.options(), fingerprint=fingerprint, stages=records)
+    metadata = {**source.metadata, RUN: manifest.entries()}
+    own = _own(bench, results)
+    if not request.force and bench.earlier is not None and _is_there(bench.earlier, metadata, own, results, source):
+        return notes
+    view = View(source.path, [own, *results])
+    span = request.span
+    size = view.size_bytes(None, span.start_ns, span.end_ns)
+    with create_recording(output, metadata) as writer, watch(f"write {output.name}", size) as progress:
+        clean = _declare(writer, own)
+        for raw in view.messages(None, span.start_ns, span.end_ns, progress):
+            writer.write(raw._replace(connection=clean[raw.connection]) if raw.connection in clean else raw)
+        for attachment in () if request.results_only else source.attachments():
+            writer.attach(attachment)
+    return notes
+
+
+def _own(bench: Bench, results: Sequence[Layer]) -> Layer:
+    """What of the log's own messages goes into the output."""
+    own = bench.own_without({entry.connection.topic for layer in results for entry in layer.channels})
+    return replace(own, channels=()) if bench.request.results_only else own
+
+
+def _declare(writer: RecordingWriter, own: Layer) -> dict[Connection, Connection]:
+    """Declare a log's own channels; those that look like results, in a file that was edited, lose that look."""
+    clean = {}
+    for entry in own.channels:
+        connection = entry.connection
+        if STAGE in connection.metadata:
+            metadata = {name: text for name, text in connection.metadata.items() if name != STAGE}
+            connection = clean[connection] = replace(connection, metadata=metadata)
+        writer.declare(connection)
+    return clean
+
+
+def _is_there(
+    earlier: Recording,
+    metadata: dict[str, dict[str, str]],
+    own: Layer,
+    results: Sequence[Layer],
+    source: Recording,
+) -> bool:
+    """Whether an earlier output holds all that would be written."""
+    found = {**earlier.metadata, RUN: {k: v for k, v in earlier.metadata.get(RUN, {}).items() if k != CONTENT}}
+    return (
+        earlier.is_ours
+        and found == metadata
+        and all(layer.recording is earlier for layer in results)
+        and _topics(own_layer(earlier)) == _topics(own)
+        and (not own.channels or list(earlier.attachments()) == list(source.attachments()))
+    )
+
+
+def _topics(layer: Layer) -> list[tuple[str, str]]:
+    return [(entry.connection.topic, entry.connection.message_type) for entry in layer.channels]

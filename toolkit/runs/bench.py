@@ -1,0 +1,155 @@
+"""One log under work: results are taken from where they lie, or made and kept beside the output until it is whole."""
+
+import contextlib
+import shutil
+from collections.abc import Callable, Collection, Iterator
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from toolkit.channels import TF
+from toolkit.errors import RecordingError
+from toolkit.manifest import Outcome, StageRecord
+from toolkit.recording.blocks import Progress
+from toolkit.recording.reader import Recording, open_recording
+from toolkit.runs.plan import Log, Request, Step
+from toolkit.runs.step import run_step, size_bytes
+from toolkit.runs.view import Layer, View, result_layers
+
+Watch = Callable[[str, int | None], AbstractContextManager[Progress]]
+"""Shows the progress of work with a label and a size in bytes, such as `toolkit.cli.console.progress`."""
+
+
+@contextlib.contextmanager
+def unwatched(_label: str, _size: int | None) -> Iterator[Progress]:
+    """Shows nothing."""
+    yield lambda _advance: None
+
+
+@dataclass(frozen=True, slots=True)
+class StageRun:
+    """What became of one stage: `state` is `ran` or `reused`, and `reason` says why, in words."""
+
+    stage: str
+    state: str
+    reason: str
+    outcome: Outcome
+
+
+@contextlib.contextmanager
+def parts_folder(output: Path) -> Iterator[Path]:
+    """Where finished stages lie until the output is whole: `.OUTPUT.parts`, which goes when the block ends well.
+
+    When it does not, what is finished stays for the next run.
+    """
+    folder = output.with_name(f".{output.name}.parts")
+    try:
+        yield folder
+    except BaseException:
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+        raise
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def open_bench(request: Request, parts: Path, output: Path | None) -> Iterator["Bench"]:
+    """A bench for one log, with the results that lie in the log, in an earlier `output` and among the `parts`.
+
+    Raises:
+        RecordingError: the log cannot be read.
+    """
+    with ExitStack() as stack:
+        log = Log(stack.enter_context(open_recording(request.recording)), request.span)
+        yield Bench(stack, request, log, parts, output)
+
+
+class Bench:
+    """One log and its results so far; made by `open_bench`."""
+
+    def __init__(self, stack: ExitStack, request: Request, log: Log, parts: Path, output: Path | None) -> None:
+        self.request, self.log = request, log
+        self.results = dict(log.results)
+        self._stack, self._parts = stack, parts
+        self.earlier: Recording | None = None
+        self._stores: list[tuple[str, dict[str, Layer]]] = [("the log", log.results)]
+        if output is not None and output.is_file():
+            with contextlib.suppress(RecordingError):  # what is no recording has no results
+                self.earlier = self._open(output)
+                self._stores.append(("the earlier output", result_layers(self.earlier)))
+
+    def view(self, record: StageRecord) -> View:
+        """What a stage sees: the log, with the results that its record says it reads."""
+        read = [self.results[name] for name in sorted(record.inputs) if name in self.results]
+        topics = {entry.connection.topic for layer in read for entry in layer.channels}
+        return View(self.log.path, [self.own_without(topics), *read])
+
+    def work(self, step: Step, watch: Watch) -> StageRun:
+        """The results of a step: found, or made now."""
+        found = None if self.request.force else self.find(step.record)
+        if found is not None:
+            return found
+        reason, (stage, span) = self._why(step.record), (step.stage, self.request.span)
+        view, target = self.view(step.record), self.part(step.record)
+        with watch(f"{stage.name} {self.log.path.name}", size_bytes(step, view, span)) as progress:
+            record = run_step(step, view, span, self.request.thinning, target, progress)
+        self.take(target)
+        return StageRun(stage.name, "ran", reason, record.outcome)
+
+    def find(self, record: StageRecord) -> StageRun | None:
+        """The results with the key of a record, taken from where they lie; None if they lie nowhere."""
+        part = self._parts / record.file_name
+        unfinished = [("what an unfinished run left", result_layers(self._open(part)))] if part.is_file() else []
+        for place, layers in [*unfinished, *self._stores]:
+            layer = layers.get(record.stage)
+            if layer is not None and layer.record is not None and layer.record.key == record.key:
+                self.results[record.stage] = layer
+                return StageRun(record.stage, "reused", f"the same results are in {place}", layer.record.outcome)
+        return None
+
+    def part(self, record: StageRecord) -> Path:
+        """The file for the results of a record, in a folder that exists."""
+        self._parts.mkdir(exist_ok=True)
+        return self._parts / record.file_name
+
+    def take(self, part: Path) -> None:
+        """Show the results in a part to the next stages."""
+        self.results.update(result_layers(self._open(part)))
+
+    def kept_results(self) -> tuple[list[Layer], list[str]]:
+        """The results for an output, by stage, and the stages whose results are left out.
+
+        These are such as were made from results that are not the ones for the output.
+        """
+        kept, stale = dict(sorted(self.results.items())), list[str]()
+        while True:
+            keys = {name: layer.record.key for name, layer in kept.items() if layer.record is not None}
+            wrong = [
+                name
+                for name, layer in kept.items()
+                if layer.record is not None
+                and any(source in stale or keys.get(source, key) != key for source, key in layer.record.inputs.items())
+            ]
+            if not wrong:
+                return list(kept.values()), stale
+            stale += wrong
+            for name in wrong:
+                del kept[name]
+
+    def own_without(self, topics: Collection[str]) -> Layer:
+        """The log's own messages, without those on topics that results are on; transforms stand beside each other."""
+        own, gone = self.log.own, {*topics} - {TF.topic}
+        return replace(own, channels=tuple(entry for entry in own.channels if entry.connection.topic not in gone))
+
+    def _open(self, path: Path) -> Recording:
+        return self._stack.enter_context(open_recording(path))
+
+    def _why(self, record: StageRecord) -> str:
+        """Why a stage has to run, in words: what became other since the results that there are."""
+        if self.request.force:
+            return "--force"
+        for place, layers in reversed(self._stores):
+            layer = layers.get(record.stage)
+            if layer is not None and layer.record is not None:
+                return f"{record.difference(layer.record)} since the results in {place}"
+        return "there were no results"

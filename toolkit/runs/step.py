@@ -1,0 +1,118 @@
+"""One stage over what it sees of a log: its results as a recording of their own."""
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from toolkit.channels import ANNOTATIONS, CAMERA_IMAGE, ODOM_FRAME, ODOMETRY, TF, TF_STATIC
+from toolkit.errors import UsageError
+from toolkit.manifest import RUN, Manifest, Outcome, StageRecord
+from toolkit.messages.codec import decode
+from toolkit.recording.blocks import Progress
+from toolkit.recording.writer import create_recording
+from toolkit.runs.bundles import Reading, Span, held_before, inputs_of, read_bundles
+from toolkit.runs.inputs import beside_camera_info, choose
+from toolkit.runs.plan import Step
+from toolkit.runs.tallies import tally
+from toolkit.runs.thinning import Thinning, thin
+from toolkit.runs.view import Readable, View
+from toolkit.stage import Channel, Connection, Omission, RawMessage, Stage, Stamped
+
+
+def run_step(
+    step: Step, view: View, span: Span, thinning: Thinning, target: Path, progress: Progress | None = None
+) -> StageRecord:
+    """Run a stage over a view; its results, with the record that is returned, become the recording `target`.
+
+    Raises:
+        ToolkitError: the view or a file cannot be used; nothing is left behind.
+    """
+    stage, reading, counts = step.stage, Reading(), Counter[str]()
+    inputs = inputs_of(view, stage.reads, stage.reads[:1], span.choice)
+    primary = next(connection for connection, channel in inputs.items() if channel == stage.reads[0])
+    writes, notes = _writes(stage, view, primary, step.config)
+    with create_recording(target) as writer:
+        raws = _raws(stage, view, inputs, span, thinning, reading, progress)
+        bundles = read_bundles(raws, inputs, stage.reads, reading)
+        for result in stage.process(bundles, step.config, step.files):
+            if isinstance(result, Omission):
+                _omit(result, primary, reading)
+            elif result.channel in writes:
+                counts.update(tally(result.message))
+                writer.add(Stamped(writes[result.channel], result.log_time_ns, result.message), stage.name)
+        reading.close(view.losses)
+        record = step.record.with_outcome(outcome_of(reading, counts, notes))
+        writer.metadata[RUN] = Manifest("part", fingerprint=record.key, stages=(record,)).entries()
+    return record
+
+
+def outcome_of(reading: Reading, counts: Counter[str] | None = None, notes: tuple[str, ...] = ()) -> Outcome:
+    """What came of a reading, for the record."""
+    unreadable = reading.unreadable.total()
+    counted = dict(sorted((counts or Counter()).items()))
+    return Outcome(reading.association.bundles, unreadable, counted, reading.notes(), tuple(reading.losses), notes)
+
+
+def size_bytes(step: Step, view: View, span: Span) -> int:
+    """The bytes that a stage will have to read."""
+    inputs = inputs_of(view, step.stage.reads, step.stage.reads[:1], span.choice)
+    return view.size_bytes(tuple(inputs), span.start_ns, span.end_ns)
+
+
+def _raws(
+    stage: Stage,
+    view: View,
+    inputs: dict[Connection, Channel[Any]],
+    span: Span,
+    thinning: Thinning,
+    reading: Reading,
+    progress: Progress | None,
+) -> Iterator[RawMessage]:
+    """The messages that a stage reads, without the images that thinning leaves out."""
+    thinned = stage.reads[0] == CAMERA_IMAGE and bool(thinning.options())
+    odometry = choose(view, ODOMETRY, span.choice) if thinned and thinning.by_motion else ()
+    if thinned and thinning.by_motion and not odometry:
+        raise UsageError(f"{view.path}: --every needs odometry, and there is none; use --image-rate")
+    wanted = {*inputs, *odometry}
+    raws = view.messages(wanted, span.start_ns, span.end_ns, progress)
+    if thinned:
+        images = [connection for connection, channel in inputs.items() if channel == CAMERA_IMAGE]
+        raws = thin(raws, images, odometry, thinning, reading.dropped)
+    return chain(held_before(view, inputs, span.start_ns), raws)
+
+
+def _omit(omission: Omission, primary: Connection, reading: Reading) -> None:
+    if omission.lost:
+        reading.lose(primary.topic, omission.log_time_ns, omission.reason)
+    else:
+        reading.dropped[omission.reason] += 1
+
+
+def _writes(
+    stage: Stage, view: View, primary: Connection, config: Any
+) -> tuple[dict[Channel[Any], Channel[Any]], tuple[str, ...]]:
+    """The stage's channels and those that they become here, and what is to be said about them.
+
+    Annotations follow the camera's namespace; /tf is left out if the odometry frame has a parent already.
+    """
+    writes = {channel: channel for channel in stage.writes}
+    if ANNOTATIONS in writes:
+        writes[ANNOTATIONS] = beside_camera_info(view, ANNOTATIONS, primary)
+    if TF in writes and getattr(config, "tf", "auto") == "auto" and _odom_has_parent(view):
+        del writes[TF]
+        return writes, (f"{ODOM_FRAME} has a parent frame already; no map -> odom transform is written",)
+    return writes, ()
+
+
+def _odom_has_parent(view: Readable) -> bool:
+    topics = {TF.topic, TF_STATIC.topic}
+    connections = [entry.connection for entry in view.channels if entry.connection.topic in topics]
+    name = ODOM_FRAME.encode() + b"\0"
+    for raw in view.messages(connections):
+        if name in bytes(raw.data):  # decode only what can have it as child
+            message = decode(TF.message, raw.data)
+            if any(transform.child_frame_id.lstrip("/") == ODOM_FRAME for transform in message.transforms):
+                return True
+    return False
