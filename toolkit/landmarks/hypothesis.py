@@ -69,7 +69,9 @@ class Hypothesis:
     def saw(self, objects: Objects) -> list[tuple["Hypothesis", Fix]]:
         """After a bundle, in each way in which it may have to be read, likeliest first, with how it fits."""
         covariance = block_diagonal(objects.covariances[None])
-        sets = self.matcher.sets(objects.points_xy[None], covariance, objects.probabilities[None])
+        sets = self.matcher.sets(
+            objects.points_xy[None], covariance, objects.probabilities[None], objects.spurious[None]
+        )
         readings = self._readings(sets, objects)
         return [self._after(sets, objects, reading) for reading in readings]
 
@@ -114,7 +116,7 @@ class Hypothesis:
 
     def _likely(self, landmarks: Ints, sets: Constellations, objects: Objects, covariance: Array) -> float:
         """Logarithm of how likely a reading is; landmarks seen again count as often as they were seen apart."""
-        spurious = self.matcher.config.spurious
+        spurious = objects.spurious
         used = landmarks != UNMATCHED
         rows = np.flatnonzero(used)
         likely = float(sets.log_ratio[0, rows, self.matcher.index.class_of[landmarks[rows]]].sum())
@@ -150,13 +152,12 @@ class Hypothesis:
         places = se2.transform_points(reading.pose, points)
         places[used] = self.matcher.index.positions_xy[landmarks[used]]
         again = self.memory.recall(landmarks, places, _AGAIN_SIGMAS * np.sqrt(variance))
-        spurious = self.matcher.config.spurious
-        gain = np.where(used, 0.0, np.log(spurious))
+        gain = np.where(used, 0.0, np.log(objects.spurious))
         new = np.flatnonzero(used & (again < 0))
         if len(new):
             before = self._surprise(landmarks, objects, used & (again >= 0), reading.covariance)[0]
             likely = before - self._surprise(landmarks, objects, used, reading.covariance)[0]
-            gain[new] = likely / len(new) + np.log1p(-spurious) - self._expected_at(places[new])
+            gain[new] = likely / len(new) + np.log1p(-objects.spurious[new]) - self._expected_at(places[new])
             gain[new] += sets.log_ratio[0, new, self.matcher.index.class_of[landmarks[new]]]
         return self.memory.with_more(again, landmarks, places, gain)
 

@@ -1,6 +1,7 @@
 """Match the bundles of a log one after the other, joined through odometry."""
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ class Joiner:
         self._forget()
 
     def _forget(self) -> None:
-        self._around = Surroundings(self._matcher.density, self._frequency, self._length_m)
+        self._around = Surroundings(self._matcher.density, self._frequency, self._length_m, self._matcher.config)
         self._searcher = Searcher(self._matcher, self._length_m)
         self._follower: Follower | None = None
         self._before: OdometryAt | None = None
@@ -53,6 +54,7 @@ class Joiner:
         self._move(odometry)
         old = self._around.numbers
         numbers = self._around.see(objects.points_xy, objects.covariances, objects.probabilities)
+        objects = replace(objects, spurious=self._around.spurious_of(numbers))
         fresh = ~np.isin(self._around.numbers, old)
         joined = self._count(scene, odometry.way_m)
         if self._follower is not None:

@@ -59,13 +59,14 @@ class Objects:
     """K objects of one bundle that could be in the map.
 
     rows (K,) in the scene, points_xy (K, 2) and covariances (K, 2, 2) in the base frame, probabilities (K, C) of what
-    was seen, were the object of each class.
+    was seen, were the object of each class, spurious (K,) the probability that it is not in the map.
     """
 
     rows: Ints
     points_xy: Array
     covariances: Array
     probabilities: Array
+    spurious: Array
 
 
 class Matcher:
@@ -79,7 +80,7 @@ class Matcher:
         spread = np.where(unknown[:, None, None], config.map_sigma_m**2 * np.eye(2), index.covariances)
         sigma_m = float(np.sqrt(np.quantile(spread[:, [0, 1], [0, 1]].max(axis=1), 0.9)))
         self._finder = Finder(index, sigma_m)
-        self.verifier = Verifier(index, spread, config.spurious, float(chi_square.isf(_OBJECT, 2)))
+        self.verifier = Verifier(index, spread, float(chi_square.isf(_OBJECT, 2)))
 
     def objects(self, scene: SceneObjects) -> Objects:
         """The nearest objects of a scene whose classes the map knows.
@@ -94,7 +95,8 @@ class Matcher:
         self._check_unit(scene.positions_xy[rows])
         covariances = known_covariances(scene, self.config.range_sigma_m, self.config.bearing_sigma_rad)
         probabilities = self.evidence.probabilities([scene.hypotheses[i] for i in rows])
-        return Objects(rows, scene.positions_xy[rows], covariances[rows], probabilities)
+        spurious = np.full(len(rows), self.config.spurious)
+        return Objects(rows, scene.positions_xy[rows], covariances[rows], probabilities, spurious)
 
     def _check_unit(self, points: Array) -> None:
         if len(points) < 2:
@@ -109,10 +111,14 @@ class Matcher:
                 f"{nearest:.3g} to {widest:.3g} m; one of them is not in metres, so convert it"
             )
 
-    def sets(self, points: Array, covariance: Array, probabilities: Array) -> Constellations:
-        """Sets of objects: points (B, K, 2), joint covariance (B, 2K, 2K), class likelihoods (B, K, C)."""
+    def sets(self, points: Array, covariance: Array, probabilities: Array, spurious: Array) -> Constellations:
+        """Sets of objects: points (B, K, 2), joint covariance (B, 2K, 2K), class likelihoods (B, K, C).
+
+        `spurious` (B, K) is the probability that each is not in the map.
+        """
         log_ratio = self.evidence.log_ratios(probabilities.reshape(-1, probabilities.shape[-1]))
-        return Constellations(points, covariance, log_ratio.reshape(probabilities.shape), self.density.chain(points))
+        density = self.density.chain(points)
+        return Constellations(points, covariance, log_ratio.reshape(probabilities.shape), density, spurious)
 
     def candidates(self, sets: Constellations, fresh: Bools) -> Candidates:
         """Poses to try, from pairs or triangles of objects of which one is `fresh` (B, K)."""
@@ -153,6 +159,7 @@ class Matcher:
                 np.stack([read[i].points_xy for i in members]),
                 block_diagonal(np.stack([read[i].covariances for i in members])),
                 np.stack([read[i].probabilities for i in members]),
+                np.stack([read[i].spurious for i in members]),
             )
             fresh = np.ones((len(members), size), dtype=np.bool_)
             for i, places in zip(members, self.places(sets, self.candidates(sets, fresh)), strict=True):

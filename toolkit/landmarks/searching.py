@@ -60,12 +60,15 @@ class Searcher:
         return best
 
     def _windows(self, around: Surroundings) -> list[Ints]:
-        """Rows of what was seen over each share of the length, none twice, at least two objects each."""
+        """Rows of what was seen over each share of the length and of what was seen again, at least two objects each."""
         windows: list[Ints] = []
         for share in _SHARES:
             rows = np.flatnonzero(around.age_m <= share * self._length_m)
             if len(rows) > 1 and (not windows or len(rows) < len(windows[-1])):
                 windows.append(rows)
+        again = np.flatnonzero(around.sightings > 1)
+        if len(again) > 1 and not any(np.array_equal(again, rows) for rows in windows):
+            windows.append(again)
         return windows
 
     def _started(self, around: Surroundings, fresh: Bools) -> list[_Guess]:
@@ -75,7 +78,8 @@ class Searcher:
     def _set(self, around: Surroundings, rows: Ints) -> Constellations:
         both = np.stack([2 * rows, 2 * rows + 1], axis=1).ravel()
         covariance = around.covariance[both][:, both]
-        return self._matcher.sets(around.points_xy[rows][None], covariance[None], around.probabilities[rows][None])
+        points, probabilities = around.points_xy[rows], around.probabilities[rows]
+        return self._matcher.sets(points[None], covariance[None], probabilities[None], around.spurious[rows][None])
 
     def _places(self, around: Surroundings, pool: list[_Guess], rows: Ints, tests: int) -> Places | None:
         numbers = around.numbers[rows].tolist()

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from toolkit.geometry import se2
 from toolkit.landmarks.acceptance import PairDensity
+from toolkit.landmarks.matching import MatchConfig
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -14,6 +15,10 @@ _MOST = 24
 _SYSTEMATIC = 0.5
 # What was seen once, and not in some more bundles over some way, was no object.
 _STRAY_BUNDLES, _STRAY_M = 2, 2.0
+# The share of objects that are none, as configured, counts like so many objects; the log's own strays do the rest.
+_BELIEVED = 10.0
+# An object is missed in the bundle after so much more rarely than what is none.
+_MISSED = 0.25
 _TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
@@ -25,16 +30,18 @@ class Surroundings:
     sighting, since shapes and sensors err alike from similar views, so looking longer helps only so far.
     """
 
-    def __init__(self, density: PairDensity, frequency: Array, length_m: float) -> None:
-        self._density, self._frequency, self._length_m = density, frequency, length_m
+    def __init__(self, density: PairDensity, frequency: Array, length_m: float, config: MatchConfig) -> None:
+        self._density, self._frequency, self._length_m, self._config = density, frequency, length_m, config
         self._way_m = 0.0
+        self._strays = 0
         self._next = 0
         self.numbers: Ints = np.zeros(0, dtype=np.int64)
         self.points_xy: Array = np.zeros((0, 2))
-        self.probabilities: Array = np.zeros((0, 0))
+        self._called: Array = np.zeros((0, len(frequency)))
+        self._votes: Array = np.zeros((0, len(frequency)))
         self._white: Array = np.zeros((0, 0))
         self._common: Array = np.zeros((0, 2, 2))
-        self._sightings: Ints = np.zeros(0, dtype=np.int64)
+        self.sightings: Ints = np.zeros(0, dtype=np.int64)
         self._seen_at_m: Array = np.zeros(0)
         self._last_bundle: Ints = np.zeros(0, dtype=np.int64)
         self._bundles = 0
@@ -56,6 +63,36 @@ class Surroundings:
         age: Array = self._way_m - self._seen_at_m
         return age
 
+    @property
+    def probabilities(self) -> Array:
+        """Likelihoods (N, C) of all that was seen of each, were it of each class, up to a factor.
+
+        Views of one object err alike, so n of them count as the square root of n; none outweighs a class that is
+        misread from everywhere.
+        """
+        votes = self._votes / np.sqrt(self.sightings)[:, None]
+        likely = np.exp(votes - votes.max(axis=1, initial=-np.inf, keepdims=True))
+        likely /= likely.sum(axis=1, keepdims=True)
+        floored: Array = np.maximum(likely, self._config.misread / len(self._frequency))
+        return floored
+
+    @property
+    def spurious(self) -> Array:
+        """Probability (N,) that each is not in the map, or no object at all: what was seen again is one.
+
+        How much of what is seen is none is learned from what was not seen again.
+        """
+        missed = self._missed()
+        strays = self._strays + int(missed.sum())
+        share = (_BELIEVED * self._config.spurious + strays) / (_BELIEVED + self._next)
+        once = np.where(missed, share / (share + (1 - share) * _MISSED), share)
+        return np.where(self.sightings < 2, np.maximum(once, self._config.spurious), self._config.spurious)
+
+    def spurious_of(self, numbers: Ints) -> Array:
+        """The same (K,) of objects by their numbers."""
+        place = np.searchsorted(self.numbers, numbers)
+        return self.spurious[place]
+
     def move(self, step: Array, step_covariance: Array, way_m: float) -> None:
         """The base moves by `step` (3,) over a way, known up to a covariance (3, 3) in the frame it starts from."""
         self._way_m += way_m
@@ -73,7 +110,8 @@ class Surroundings:
         # Where more than one landmark would fit by chance, an object has nothing left to say.
         own = self._own()
         crowd = 2 * np.pi * np.sqrt(np.maximum(np.linalg.det(own), 0)) * np.exp(self._density.log_density[-1])
-        stray = (self._sightings < 2) & (self._last_bundle < self._bundles - _STRAY_BUNDLES) & (self.age_m > _STRAY_M)
+        stray = (self.sightings < 2) & (self._last_bundle < self._bundles - _STRAY_BUNDLES) & (self.age_m > _STRAY_M)
+        self._strays += int(stray.sum())
         self._keep((self.age_m < self._length_m) & (crowd < 1) & ~stray)
 
     def see(self, points_xy: Array, covariances: Array, probabilities: Array) -> Ints:
@@ -97,9 +135,13 @@ class Surroundings:
             free[track] = False
         for row in np.flatnonzero(numbers < 0):
             numbers[row] = self._add(points_xy[row], covariances[row], probabilities[row])
-        newest_first = np.lexsort((-self._sightings, -self._last_bundle))
+        newest_first = np.lexsort((-self.sightings, -self._last_bundle))
         self._keep(np.isin(np.arange(len(self)), newest_first[:_MOST]))
         return numbers
+
+    def _missed(self) -> NDArray[np.bool_]:
+        """Which (N,) were seen once, and not in the bundle after."""
+        return np.logical_and(self.sightings < 2, self._last_bundle < self._bundles)
 
     def _same(self, points: Array, covariances: Array, probabilities: Array) -> Array:
         """Logarithm (K, N) of how much likelier it is that an object is one known than another one beside it."""
@@ -107,11 +149,11 @@ class Surroundings:
         miss = points[:, None] - self.points_xy[None]
         near = -(miss[..., None, :] @ np.linalg.solve(spread, miss[..., None]))[..., 0, 0] / 2
         near -= np.log(2 * np.pi) + np.log(np.linalg.det(spread)) / 2
-        agree = (probabilities * self._frequency) @ self.probabilities.T
-        agree /= np.outer(probabilities @ self._frequency, self.probabilities @ self._frequency)
+        agree = (probabilities * self._frequency) @ self._called.T
+        agree /= np.outer(probabilities @ self._frequency, self._called @ self._frequency)
         beside = self._density.at(np.linalg.norm(miss, axis=-1))
         # What lies beside an object seen so often has been seen as well (rule of succession).
-        likely: Array = near + np.log(agree) - beside + 0.75 * np.log1p(self._sightings)
+        likely: Array = near + np.log(agree) - beside + 0.75 * np.log1p(self.sightings)
         return likely
 
     def _own(self) -> Array:
@@ -128,8 +170,9 @@ class Surroundings:
         self._white = self._white - gain @ cross.T
         self._white = (self._white + self._white.T) / 2
         self._common[track] = _SYSTEMATIC * covariance
-        count = self._sightings[track] = self._sightings[track] + 1
-        self.probabilities[track] += (probabilities - self.probabilities[track]) / count
+        count = self.sightings[track] = self.sightings[track] + 1
+        self._called[track] += (probabilities - self._called[track]) / count
+        self._votes[track] += np.log(probabilities)
         self._seen_at_m[track], self._last_bundle[track] = self._way_m, self._bundles
 
     def _add(self, point: Array, covariance: Array, probabilities: Array) -> int:
@@ -140,8 +183,9 @@ class Surroundings:
         self._white = grown
         self.points_xy = np.concatenate([self.points_xy, point[None]])
         self._common = np.concatenate([self._common, _SYSTEMATIC * covariance[None]])
-        self.probabilities = np.concatenate([self.probabilities.reshape(n, len(probabilities)), probabilities[None]])
-        self._sightings = np.append(self._sightings, 1)
+        self._called = np.concatenate([self._called, probabilities[None]])
+        self._votes = np.concatenate([self._votes, np.log(probabilities)[None]])
+        self.sightings = np.append(self.sightings, 1)
         self._seen_at_m = np.append(self._seen_at_m, self._way_m)
         self._last_bundle = np.append(self._last_bundle, self._bundles)
         self.numbers = np.append(self.numbers, self._next)
@@ -154,6 +198,6 @@ class Surroundings:
         both = np.repeat(keep, 2)
         self._white = self._white[both][:, both]
         self.points_xy, self._common = self.points_xy[keep], self._common[keep]
-        self.probabilities, self._sightings = self.probabilities[keep], self._sightings[keep]
+        self._called, self._votes, self.sightings = self._called[keep], self._votes[keep], self.sightings[keep]
         self._seen_at_m, self._last_bundle = self._seen_at_m[keep], self._last_bundle[keep]
         self.numbers = self.numbers[keep]

@@ -28,13 +28,15 @@ class Constellations:
     """B sets of K objects each, as seen in their base frame.
 
     points_xy (B, K, 2) m with the joint covariance (B, 2K, 2K) m^2 of all their coordinates, log_ratio (B, K, C) of
-    their class evidence, log_density (B, K) of landmarks expected there at an unknown place.
+    their class evidence, log_density (B, K) of landmarks expected there at an unknown place, spurious (B, K) the
+    probability that each is not in the map.
     """
 
     points_xy: Array
     covariance: Array
     log_ratio: Array
     log_density: Array
+    spurious: Array
 
     def __len__(self) -> int:
         return len(self.points_xy)
@@ -120,13 +122,11 @@ class Solved(NamedTuple):
 class Verifier:
     """Fits candidates to a map whose landmarks have covariances `spread` (N, 2, 2), none of them unknown.
 
-    `spurious` is the probability that an object is not in the map; an object matches a landmark if its squared
-    Mahalanobis distance is below `gate`.
+    An object matches a landmark if its squared Mahalanobis distance is below `gate`.
     """
 
     index: MapIndex
     spread: Array
-    spurious: float
     gate: float
 
     def fit(self, sets: Constellations, candidates: Candidates) -> Fits:
@@ -190,7 +190,7 @@ class Verifier:
         chi2 = (miss[..., None, :] @ np.linalg.solve(spread, miss[..., None]))[..., 0, 0]
         gain = -chi2 / 2 - np.linalg.slogdet(spread)[1] / 2 - np.log(2 * np.pi)
         gain += np.take_along_axis(sets.log_ratio[of], self.index.class_of[near], axis=2)
-        gain += np.log((1 - self.spurious) / self.spurious) - sets.log_density[of][..., None]
+        gain += (np.log((1 - sets.spurious) / sets.spurious) - sets.log_density)[of][..., None]
         taken = (near[..., None] == landmarks[rows][:, None, None, :]).any(axis=-1)
         gain = np.where((chi2 > self.gate) | taken | used[rows][..., None], -np.inf, gain)
         result = landmarks.copy()
@@ -235,7 +235,7 @@ class Verifier:
 
     def _score(self, sets: Constellations, solved: Solved) -> Fits:
         (of, _, landmarks), used = solved.candidates, solved.used
-        matched, k = used.sum(axis=1), used.shape[1]
+        matched = used.sum(axis=1)
         chi2 = (solved.residual * solved.force()).sum(axis=1)
         dof = np.maximum(2 * matched - 3, 0)
         peak = (1.5 - matched) * np.log(2 * np.pi) - solved.log_det / 2
@@ -244,8 +244,8 @@ class Verifier:
         lowest = np.where(used, density, np.inf).min(axis=1)
         unknown = np.log(2 * np.pi * len(self.index)) + np.where(used, density, 0.0).sum(axis=1) - lowest
         ratio = np.take_along_axis(sets.log_ratio[of], self.index.class_of[landmarks][..., None], axis=2)[..., 0]
-        evidence = np.where(used, ratio, 0.0).sum(axis=1)
-        evidence += matched * np.log(1 - self.spurious) + (k - matched) * np.log(self.spurious)
+        spurious = sets.spurious[of]
+        evidence = np.where(used, ratio + np.log1p(-spurious), np.log(spurious)).sum(axis=1)
         best = peak - unknown + evidence
         return Fits(solved.candidates, solved.covariance, chi2, dof, best - chi2 / 2, log_tail(chi2, dof) - best)
 
