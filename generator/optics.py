@@ -43,6 +43,11 @@ class Optics:
         _, data = cv2.imencode(".jpg", cv2.cvtColor(image, cv2.COLOR_RGB2BGR), quality)
         return data.tobytes()
 
+    def developed(self, image: Image) -> Image:
+        """An RGB image (H, W, 3) as it looks after JPEG."""
+        decoded = np.asarray(cv2.imdecode(np.frombuffer(self.jpeg(image), np.uint8), cv2.IMREAD_COLOR), np.uint8)
+        return np.asarray(cv2.cvtColor(decoded, cv2.COLOR_BGR2RGB), np.uint8)
+
 
 def _smear(image: Image, width_px: float) -> Image:
     """Box filter along the rows, its width not necessarily whole."""

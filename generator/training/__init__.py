@@ -1,0 +1,1 @@
+"""The detector's training: the set of pictures, the network, its loss, the training itself, evaluation and export."""
