@@ -103,6 +103,13 @@ class Omission:
     lost: bool = False
 
 
+class Tolerance(NamedTuple):
+    """How far two values may be apart: absolute, in the field's unit, plus relative to the larger of them."""
+
+    absolute: float = 0.0
+    relative: float = 0.0
+
+
 Process = Callable[[Iterable[Bundle], Any, Mapping[str, Path]], Iterator[Stamped | Omission]]
 
 
@@ -112,7 +119,7 @@ class Stage:
 
     The first channel of `reads` is the primary one: each of its messages makes a bundle. `config` is a dataclass type;
     `resources` are files that the runner opens, hashes and passes in, `options` files that may be missing; `tolerance`
-    says how far each field may differ between two machines.
+    says how far each field, by the name that `diff` gives it, may differ between two machines; a number is absolute.
     """
 
     name: str
@@ -122,7 +129,7 @@ class Stage:
     process: Process
     resources: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
-    tolerance: Mapping[str, float] = field(default_factory=dict)
+    tolerance: Mapping[str, float | Tolerance] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,4 +146,4 @@ class Reduction:
     config: type[Any]
     collect: Callable[[Iterable[Bundle], Any], Any]
     solve: Callable[..., Any]
-    tolerance: Mapping[str, float] = field(default_factory=dict)
+    tolerance: Mapping[str, float | Tolerance] = field(default_factory=dict)

@@ -103,11 +103,12 @@ def evaluate(outcome: Outcome, reference: Reference, pairing: Pairing, *, aligne
         "nees": nees(errors, scored.covariances),
         "rpe": relative_pose_error(scored.estimate, scored.reference),
         "map": None if landmarks is None or objects is None else landmark_figures(landmarks, objects),
-        "alignment": _alignment(scored.reference_from_estimate),
+        "alignment": alignment_document(scored.reference_from_estimate),
     }
 
 
-def _alignment(transform: Array | None) -> dict[str, float] | None:
+def alignment_document(transform: Array | None) -> dict[str, float] | None:
+    """The field `alignment` of a document: a transform (3,) in metres and degrees, or None."""
     if transform is None:
         return None
     x_m, y_m, heading_rad = transform.tolist()

@@ -42,7 +42,7 @@ def read_run(path: Path, progress: Progress | None = None) -> tuple[Outcome, Ref
     """
     if path.suffix == ".txt":
         return *_appendix_d(path), []
-    if path.suffix == ".db" or _is_sqlite(path):
+    if is_database(path):
         return Outcome(_trajectory([]), 0, landmarks=scene_from_map(read_map(path), 0)), Reference(), []
     found = _collect(path, (*_RESULTS, *_TRUTH), progress)
     return found.outcome(), found.reference(), found.losses
@@ -75,12 +75,13 @@ def _appendix_d(path: Path) -> tuple[Outcome, Reference]:
     )
 
 
-def _is_sqlite(path: Path) -> bool:
+def is_database(path: Path) -> bool:
+    """Whether a file is, or by its name should be, a landmark database."""
     try:
         with path.open("rb") as stream:
-            return stream.read(15) == b"SQLite format 3"
+            return path.suffix == ".db" or stream.read(15) == b"SQLite format 3"
     except OSError:
-        return False  # opening it as a recording says what is wrong
+        return path.suffix == ".db"  # opening it says what is wrong
 
 
 @dataclass(slots=True)
