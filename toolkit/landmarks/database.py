@@ -29,7 +29,7 @@ def read_map(path: Path) -> LandmarkMap:
     try:
         with _reading(path) as database:
             _check_version(path, database)
-            return _read(database)
+            return _read(path, database)
     except (sqlite3.Error, ValueError, TypeError, KeyError) as error:
         raise MapError(f"{path}: is not a landmark database or is damaged ({error}); build it again") from error
 
@@ -83,7 +83,14 @@ def _check_version(path: Path, database: sqlite3.Connection) -> None:
         )
 
 
-def _read(database: sqlite3.Connection) -> LandmarkMap:
+def _read(path: Path, database: sqlite3.Connection) -> LandmarkMap:
+    try:
+        return _map_of(database)
+    except MapError as error:
+        raise MapError(f"{path}: {error}") from error
+
+
+def _map_of(database: sqlite3.Connection) -> LandmarkMap:
     frame = database.execute("SELECT frame FROM map").fetchone()
     if frame is None:
         raise ValueError("its table map is empty")

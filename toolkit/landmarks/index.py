@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from toolkit.errors import MapError
 from toolkit.landmarks.model import LandmarkMap
+from toolkit.landmarks.plausible import check_map
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -86,14 +86,11 @@ class MapIndex:
         """Index of the confirmed landmarks.
 
         Raises:
-            MapError: no confirmed landmark, or all in one place.
+            MapError: the map is not fit to localize in, see `check_map`.
         """
+        check_map(landmark_map)
         rows = np.flatnonzero(~landmark_map.tentative)
         positions = landmark_map.positions_xy[rows]
-        if not len(rows):
-            raise MapError("the map has no confirmed landmarks; build it from a log that sees them more often")
-        if np.ptp(positions, axis=0).max() < 1e-9:
-            raise MapError("all landmarks of the map lie in one place; a map without geometry cannot localize")
         names, class_of = np.unique([landmark_map.classes[i] for i in rows], return_inverse=True)
         places = cKDTree(positions, balanced_tree=False)
         near = _neighbours(places, positions)

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 from scipy.stats import chi2 as chi_square
 
-from toolkit.errors import MapError
 from toolkit.geometry import se2
 from toolkit.landmarks.acceptance import ClassEvidence, PairDensity
 from toolkit.landmarks.index import MapIndex
+from toolkit.landmarks.plausible import check_lengths
 from toolkit.landmarks.seeds import Finder
 from toolkit.landmarks.sightings import known_covariances
 from toolkit.landmarks.verdicts import Fix, Match, Places, accepted, refused
@@ -31,8 +31,6 @@ _OBJECT, _SET = 5e-4, 1e-4
 # Candidates closer than this are one place; so many places are kept.
 _SAME_M, _SAME_RAD = 0.5, 0.17
 _PLACES = 32
-# No sensor sees an object farther away, and no map has its landmarks farther apart: beyond, the unit is wrong.
-_FARTHEST_M, _SPARSEST_M = 500.0, 200.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,24 +90,11 @@ class Matcher:
         known = [i for i, options in enumerate(scene.hypotheses) if any(name in names for name, _ in options)]
         nearest = np.argsort(np.linalg.norm(scene.positions_xy[known], axis=1), kind="stable")[:_MOST]
         rows = np.sort(np.array(known, dtype=np.int64)[nearest])
-        self._check_unit(scene.positions_xy[rows])
+        check_lengths(scene.positions_xy[rows], self.index.extent_m)
         covariances = known_covariances(scene, self.config.range_sigma_m, self.config.bearing_sigma_rad)
         probabilities = self.evidence.probabilities([scene.hypotheses[i] for i in rows])
         spurious = np.full(len(rows), self.config.spurious)
         return Objects(rows, scene.positions_xy[rows], covariances[rows], probabilities, spurious)
-
-    def _check_unit(self, points: Array) -> None:
-        if len(points) < 2:
-            return
-        apart = np.linalg.norm(points[:, None] - points, axis=-1)[np.triu_indices(len(points), 1)]
-        nearest, widest = self.index.extent_m
-        far_objects = apart.min() > widest and np.median(np.linalg.norm(points, axis=1)) > _FARTHEST_M
-        far_landmarks = apart.max() < nearest and nearest > _SPARSEST_M
-        if far_objects or far_landmarks:
-            raise MapError(
-                f"objects of one bundle lie {apart.min():.3g} to {apart.max():.3g} m apart, landmarks of the map "
-                f"{nearest:.3g} to {widest:.3g} m; one of them is not in metres, so convert it"
-            )
 
     def sets(self, points: Array, covariance: Array, probabilities: Array, spurious: Array) -> Constellations:
         """Sets of objects: points (B, K, 2), joint covariance (B, 2K, 2K), class likelihoods (B, K, C).

@@ -10,6 +10,10 @@ from toolkit.estimation.sightings import points_from_polar
 from toolkit.geometry.se2 import Array
 from toolkit.messages.scene import SceneObjects
 
+# Two objects of one class stand farther apart than this.
+_SAME_PLACE_M = 0.05
+_LEAST_M = 1e-4
+
 
 def pick(scene: SceneObjects, rows: Sequence[int] | NDArray[np.int64]) -> SceneObjects:
     """The objects of some rows."""
@@ -26,7 +30,7 @@ def pick(scene: SceneObjects, rows: Sequence[int] | NDArray[np.int64]) -> SceneO
 
 
 def usable(scene: SceneObjects, dropped: Counter[str]) -> SceneObjects:
-    """Objects with a class, finite numbers and a covariance that is positive definite or all zero (unknown).
+    """Objects with a class, finite numbers and a covariance that is positive definite or all zero (unknown), each once.
 
     What else the scene holds is left out and counted by reason in `dropped`.
     """
@@ -41,13 +45,32 @@ def usable(scene: SceneObjects, dropped: Counter[str]) -> SceneObjects:
     dropped["objects whose covariance is not positive definite"] += int((finite & ~unknown & ~definite).sum())
     dropped["objects without a class"] += int((finite & (unknown | definite) & ~named).sum())
     keep = finite & (unknown | definite) & named
+    again = _repeated(scene, np.flatnonzero(keep))
+    dropped["objects that repeat another one of the same class and place"] += len(again)
+    keep[again] = False
     return scene if keep.all() else pick(scene, np.flatnonzero(keep))
 
 
+def _repeated(scene: SceneObjects, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Those of some rows that show the same as an earlier one."""
+    classes = np.unique([scene.classes[i] for i in rows], return_inverse=True)[1]
+    apart = np.linalg.norm(scene.positions_xy[rows, None] - scene.positions_xy[rows], axis=-1)
+    same = (apart < _SAME_PLACE_M) & (classes[:, None] == classes)
+    repeated: NDArray[np.int64] = rows[np.tril(same, -1).any(axis=1)]
+    return repeated
+
+
 def known_covariances(scene: SceneObjects, range_sigma_m: float, bearing_sigma_rad: float) -> Array:
-    """Covariances (N, 2, 2) in m^2, those that are unknown from the sigmas of range and bearing."""
+    """Covariances (N, 2, 2) in m^2, those that are unknown from the sigmas of range and bearing.
+
+    No direction is known better than to a tenth of a millimetre, whatever a log says.
+    """
     x, y = scene.positions_xy[:, 0], scene.positions_xy[:, 1]
     polar = np.diag([range_sigma_m**2, bearing_sigma_rad**2])
     _, filled = points_from_polar(np.hypot(x, y), np.arctan2(y, x), polar)
     unknown: NDArray[np.bool_] = np.logical_not(scene.covariances.any(axis=(1, 2)))
-    return np.where(unknown[:, None, None], filled, scene.covariances)
+    known = np.where(unknown[:, None, None], filled, scene.covariances)
+    xx, yy, xy = known[:, 0, 0], known[:, 1, 1], known[:, 0, 1]
+    least = (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)
+    floored: Array = known + np.where(least < _LEAST_M**2, _LEAST_M**2, 0.0)[:, None, None] * np.eye(2)
+    return floored

@@ -14,6 +14,7 @@ from toolkit.estimation.pose import solve_poses
 from toolkit.estimation.sightings import polar_from_points
 from toolkit.geometry.se2 import Array, transform_points
 from toolkit.landmarks.model import LandmarkMap
+from toolkit.landmarks.plausible import check_scale
 from toolkit.landmarks.sightings import known_covariances
 from toolkit.landmarks.unique import pairs_by_class, unique_classes
 from toolkit.landmarks.verdicts import Match
@@ -98,9 +99,17 @@ class UniqueLocator:
         return [result for result in located if result is not None]
 
     def _solve(self, problems: Sequence[_Problem]) -> list[Match]:
-        """Solve all; drop the worst observation of those that do not fit while three or more are left."""
+        """Solve all; drop the worst observation of those that do not fit while three or more are left.
+
+        Raises:
+            MapError: map and log are in different units.
+        """
         settings = self._settings
         given = _Given.of(problems, self._map, settings)
+        check_scale(
+            [problem.scene.positions_xy[problem.objects] for problem in problems],
+            [self._map.positions_xy[problem.landmarks] for problem in problems],
+        )
         if self._sensor is None:
             self._sensor = calibrate(
                 given.landmarks_xy,

@@ -17,9 +17,11 @@ from toolkit.channels import (
     SCENE_OBJECTS,
     TF,
 )
+from toolkit.errors import MapError
 from toolkit.geometry.se2 import compose, inverse
 from toolkit.landmarks.database import read_map
 from toolkit.landmarks.model import LandmarkMap
+from toolkit.landmarks.plausible import check_map
 from toolkit.landmarks.scene import scene_from_map
 from toolkit.landmarks.unique import unique_classes
 from toolkit.landmarks.verdicts import Match
@@ -78,7 +80,7 @@ class LocalizeConfig:
 
 def process(bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Path]) -> Iterator[Stamped]:
     """Match and pose of every bundle, the map once before the first."""
-    landmark_map = read_map(resources["map"])
+    landmark_map = _usable_map(resources["map"])
     locate, size = _method(landmark_map, config)
     stream, first = iter(bundles), True
     while batch := list(islice(stream, size)):
@@ -88,6 +90,20 @@ def process(bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mappin
         scenes = [scene for bundle in batch if (scene := bundle.get(SCENE_OBJECTS)) is not None]
         for bundle, match in zip(batch, locate(scenes, [bundle.odometry for bundle in batch]), strict=True):
             yield from _messages(bundle, match, landmark_map.frame, config)
+
+
+def _usable_map(path: Path) -> LandmarkMap:
+    """The map in a database, if a pose can be found in it.
+
+    Raises:
+        MapError: it cannot be read, or no pose can be found in it.
+    """
+    landmark_map = read_map(path)
+    try:
+        check_map(landmark_map)
+    except MapError as error:
+        raise MapError(f"{path}: {error}") from error
+    return landmark_map
 
 
 def _method(landmark_map: LandmarkMap, config: LocalizeConfig) -> tuple[Locate, int]:
