@@ -9,6 +9,7 @@ import numpy as np
 import torch
 import typer
 
+from generator.assets import catalog
 from generator.assets.catalog import COCO_ID
 from generator.training import export as onnx_export
 from generator.training import fitting, worlds
@@ -22,7 +23,12 @@ app = typer.Typer(
     help=__doc__
     + """
 
-A full reproduction: `pictures DIR`, `fit DIR RUN` (resumes where it was stopped), `judge RUN`, `export RUN MODEL.onnx`.
+The bundled model, from nothing: `pictures DIR`, `fit DIR RUN`, `judge RUN`, `export RUN MODEL.onnx --confidence C`
+with the threshold that `judge` shows to be best, and `python -m tests.benchmark.detector` for the figures of its card.
+
+`pictures` takes 10 minutes on two cores and 3.5 GB, `fit` about two hours there (`--device cuda`: minutes); both go on
+where they were stopped. Where something else uses the cores, OMP_WAIT_POLICY=PASSIVE GOMP_SPINCOUNT=0 keeps `fit` from
+waiting busily.
 """,
     no_args_is_help=True,
     add_completion=False,
@@ -60,7 +66,7 @@ def fit(
     if threads:
         torch.set_num_threads(threads)
     run.mkdir(parents=True, exist_ok=True)
-    recipe = fitting.Recipe(tuple(Phase(*map(int, phase.split("x"))) for phase in phases), seed)
+    recipe = fitting.Recipe(tuple(Phase.parse(phase) for phase in phases), seed)
     data = PictureSet(folder)
     examples = Examples(data, recipe.phases, seed)
     last = run / fitting.LAST
@@ -81,17 +87,16 @@ def judge(
     device: Device = "cpu",
 ) -> None:
     """Judge the averaged network on worlds kept for development, by score threshold and distance."""
-    training = fitting.start(fitting.Recipe(()), torch.device(device), run / fitting.LAST)
-    network = training.average.eval()
+    trained = fitting.trained(run / fitting.LAST, torch.device(device))
     results: dict[str, dict[int, Scored]] = {}
     for kind in ("thesis", "twelve", "empty"):
         shown = list(_developed(kind, count))
-        found = detect(network, [picture.image for picture in shown])
+        found = detect(trained.network, [picture.image for picture in shown])
         labels = [picture.labels for picture in shown]
         results[kind] = {coco_id: score(found, labels, coco_id) for coco_id in COCO_ID.values()}
         if kind == "empty":
             best = np.array([one.scores.max(initial=0.0) for one in found])
-    typer.echo(f"step {training.step}")
+    typer.echo(f"step {trained.step}")
     for kind in ("thesis", "twelve"):
         names = THESIS_CLASSES if kind == "thesis" else tuple(COCO_ID)
         values = {name: results[kind][COCO_ID[name]].average_precision() for name in names}
@@ -107,7 +112,7 @@ def judge(
 
 def _developed(kind: Kind, count: int) -> Iterator[Picture]:
     """So many pictures of worlds of one kind: looks of the training's range, from the robot's own camera."""
-    recipe = worlds.Recipe(((kind, 1.0),), worlds.TRAINING.looks, handheld=False)
+    recipe = worlds.judged(kind, catalog.TRAIN_SEEDS)
     for index in range(-(-count // 8)):
         yield from render(scene(recipe, _JUDGED_SEED, index), exposed=True)
 
@@ -120,18 +125,20 @@ def export(
     commit: Annotated[str, typer.Option(help="Commit of this code, for the record.")] = "",
 ) -> None:
     """Write the averaged network as ONNX, with names, stride, threshold and provenance in its metadata."""
-    training = fitting.start(fitting.Recipe(()), torch.device("cpu"), run / fitting.LAST)
+    trained = fitting.trained(run / fitting.LAST, torch.device("cpu"))
     data = json.loads((run / "pictures.json").read_text(encoding="utf-8"))
     about = {
         "confidence": str(confidence),
         "producer": "mcap-landmarks generator.train",
         "commit": commit,
-        "steps": str(training.step),
+        "seed": str(trained.recipe.seed),
+        "phases": " ".join(str(phase) for phase in trained.recipe.phases),
+        "steps": str(trained.step),
         "pictures": str(data["pictures"]),
         "pictures_sha256": data["sha256"],
         "licence": "the licence of mcap-landmarks",
     }
-    onnx_export.export(training.average, model, None, about)
+    onnx_export.export(trained.network, model, None, about)
     typer.echo(f"{model}: {model.stat().st_size / 1e6:.1f} MB")
 
 

@@ -2,6 +2,7 @@
 
 import functools
 from dataclasses import dataclass
+from typing import Self
 
 import cv2
 import numpy as np
@@ -32,6 +33,14 @@ class Phase:
     batch: int
     height_px: int
     width_px: int
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """From `4000x32x320x320`: steps, batch, height, width."""
+        return cls(*(int(number) for number in text.split("x")))
+
+    def __str__(self) -> str:
+        return f"{self.steps}x{self.batch}x{self.height_px}x{self.width_px}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -87,6 +87,25 @@ def start(recipe: Recipe, device: torch.device, checkpoint: Path | None = None) 
     return training
 
 
+@dataclass(frozen=True, slots=True)
+class Trained:
+    """The averaged network of a checkpoint, with the steps, seconds and recipe that made it."""
+
+    network: Network
+    step: int
+    seconds: float
+    recipe: Recipe
+
+
+def trained(checkpoint: Path, device: torch.device) -> Trained:
+    """What a checkpoint holds, ready to detect."""
+    state: dict[str, Any] = torch.load(checkpoint, map_location=device, weights_only=True)
+    network = Network("n", len(CLASS_IDS)).to(device)
+    network.load_state_dict(state["average"])
+    phases = tuple(Phase(**phase) for phase in state["recipe"].pop("phases"))
+    return Trained(network.eval(), state["step"], state["seconds"], Recipe(phases, **state["recipe"]))
+
+
 def fit(
     training: Training,
     recipe: Recipe,

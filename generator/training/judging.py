@@ -36,7 +36,9 @@ def _found(rows: np.ndarray[tuple[int, int], np.dtype[np.float32]]) -> Found:
     best = scores.argmax(axis=1) if len(rows) else np.zeros(0, int)
     scores = scores[np.arange(len(rows)), best]
     boxes = np.hstack([rows[:, :2] - rows[:, 2:4] / 2, rows[:, 2:4]]).astype(np.float64)
-    chosen = cv2.dnn.NMSBoxesBatched(boxes.tolist(), scores.tolist(), best.tolist(), _LEAST_SCORE, _OVERLAP, top_k=_MOST)
+    chosen = cv2.dnn.NMSBoxesBatched(
+        boxes.tolist(), scores.tolist(), best.tolist(), _LEAST_SCORE, _OVERLAP, top_k=_MOST
+    )
     kept = np.asarray(chosen, dtype=np.intp).reshape(-1)
     corners = np.hstack([boxes[kept, :2], boxes[kept, :2] + boxes[kept, 2:]])
     return Found(corners, scores[kept], CLASS_IDS[best[kept]])

@@ -28,19 +28,30 @@ _TRIES = 200
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """What worlds are like: how often each kind comes, which looks objects have, and whether cameras are handheld."""
+    """What worlds are like: how often each kind comes, how many objects stand in a disc of 11 m, and how they look.
+
+    `handheld` cameras are at times higher than the robot's, and not level.
+    """
 
     kinds: tuple[tuple[Kind, float], ...]
     looks: range
-    handheld: bool
+    objects: range = range(12, 26)
+    handheld: bool = False
 
 
 TRAINING = Recipe((("thesis", 0.5), ("twelve", 0.38), ("empty", 0.12)), catalog.TRAIN_SEEDS, handheld=True)
 
 
-def held_out(kind: Kind) -> Recipe:
-    """Worlds of one kind with looks that no training has seen, from the robot's own camera."""
-    return Recipe(((kind, 1.0),), catalog.HELD_OUT_SEEDS, handheld=False)
+_THESIS_OBJECTS = range(4, 11)
+
+
+def judged(kind: Kind, looks: range) -> Recipe:
+    """Worlds of one kind as the robot's own camera sees them; with `HELD_OUT_SEEDS`, nothing that training has seen.
+
+    The thesis's are as sparse as its groups of three are; those of twelve classes are crowded.
+    """
+    objects = _THESIS_OBJECTS if kind == "thesis" else TRAINING.objects
+    return Recipe(((kind, 1.0),), looks, objects)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +69,7 @@ def scene(recipe: Recipe, seed: int, index: int) -> Scene:
     names, shares = zip(*recipe.kinds, strict=True)
     kind: Kind = names[rng.choice(len(names), p=shares)]
     layout.built.cache_clear()  # looks hardly ever come twice
-    objects = place(tuple(_scattered(kind, recipe.looks, rng)))
+    objects = place(tuple(_scattered(kind, recipe, rng)))
     scenario = Scenario(
         seed=int(rng.integers(2**31)),
         ground=GroundSpec(kind=_one(ground.KINDS, rng), look=_look(recipe.looks, rng), tile_m=rng.uniform(1.2, 3.5)),
@@ -97,17 +108,17 @@ def _camera(rng: np.random.Generator) -> CameraSpec:
     )
 
 
-def _scattered(kind: Kind, looks: range, rng: np.random.Generator) -> Iterator[ObjectSpec]:
+def _scattered(kind: Kind, recipe: Recipe, rng: np.random.Generator) -> Iterator[ObjectSpec]:
     """Objects that stand free of each other in a disc around the origin."""
     names: list[str] = []
     if kind != "empty":
         classes = THESIS_CLASSES if kind == "thesis" else catalog.CLASSES
-        names = [_one(classes, rng) for _ in range(rng.integers(12, 26))]
+        names = [_one(classes, rng) for _ in range(rng.integers(recipe.objects.start, recipe.objects.stop))]
     distractors = rng.integers(6, 16) if kind == "empty" else rng.integers(7)
     names += [_one(catalog.DISTRACTORS, rng) for _ in range(distractors)]
     taken: list[tuple[NDArray[np.float64], float]] = []
     for name in names:
-        variant, look = _one(catalog.VARIANTS[name], rng), _look(looks, rng)
+        variant, look = _one(catalog.VARIANTS[name], rng), _look(recipe.looks, rng)
         reach = layout.built(name, variant, look).footprint_radius_m
         spot = _free(lambda: _in_disc(rng), taken, reach + 0.1)
         if spot is not None:

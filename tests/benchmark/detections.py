@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from generator.assets.catalog import COCO_ID
+from generator.assets.catalog import COCO_ID, HELD_OUT_SEEDS
 from generator.camera import Intrinsics
 from generator.checks import stage
 from generator.loading import load_scenario
@@ -16,7 +16,7 @@ from generator.record import record
 from generator.sensor_specs import CameraSpec
 from generator.training.pictures import Labels, Picture, render
 from generator.training.scoring import Found, Scored, iou, joined, score
-from generator.training.worlds import THESIS_CLASSES, Kind, held_out, scene
+from generator.training.worlds import THESIS_CLASSES, Kind, judged, scene
 from tests.benchmark.rows import Row
 from toolkit import resources
 from toolkit.channels import DETECTIONS, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
@@ -91,7 +91,7 @@ def measure(quick: bool) -> Iterator[Row]:
 
 def _worlds(kind: Kind, images: int) -> Iterator[Picture]:
     for index in range(images // VIEWS):
-        yield from render(scene(held_out(kind), SEED, index), exposed=True)
+        yield from render(scene(judged(kind, HELD_OUT_SEEDS), SEED, index), exposed=True)
 
 
 def _at_2_to_15_m(labels: Sequence[Labels]) -> list[Labels]:

@@ -146,6 +146,9 @@ def test_a_stopped_training_goes_on_as_if_it_had_not_stopped(tmp_path: Path) -> 
     steps.close()
     resumed = fitting.start(recipe, cpu, tmp_path / fitting.LAST)
     assert resumed.step == 3
+    assert str(recipe.phases[0]) == "6x2x64x64" == str(Phase.parse("6x2x64x64"))
     list(fitting.fit(resumed, recipe, _TwoSteps(), tmp_path, save_every=100, beside=False))  # type: ignore[arg-type]
+    kept = fitting.trained(tmp_path / fitting.LAST, cpu)
+    assert kept.recipe == recipe
     for name, value in whole.average.state_dict().items():
         assert torch.equal(value, resumed.average.state_dict()[name]), name

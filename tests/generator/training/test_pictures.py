@@ -10,7 +10,7 @@ pytest.importorskip("pybullet")
 from generator.assets.catalog import COCO_ID, HELD_OUT_SEEDS, TRAIN_SEEDS
 from generator.training.examples import CLASS_IDS, Examples, Phase
 from generator.training.pictures import PictureSet, make, render
-from generator.training.worlds import THESIS_CLASSES, TRAINING, held_out, scene
+from generator.training.worlds import THESIS_CLASSES, TRAINING, judged, scene
 
 
 def test_a_scene_depends_on_its_index_only() -> None:
@@ -22,7 +22,7 @@ def test_a_scene_depends_on_its_index_only() -> None:
 
 @pytest.mark.parametrize("kind", ["thesis", "twelve", "empty"])
 def test_held_out_worlds_are_of_their_kind_and_look_like_nothing_trained_on(kind: str) -> None:
-    one = scene(held_out(kind), 10_000, 0)  # type: ignore[arg-type]
+    one = scene(judged(kind, HELD_OUT_SEEDS), 10_000, 0)  # type: ignore[arg-type]
     names = {placed.asset.name for placed in one.objects if placed.is_landmark}
     assert names <= {"thesis": set(THESIS_CLASSES), "twelve": set(COCO_ID), "empty": set()}[kind]
     assert bool(names) == (kind != "empty")
@@ -41,7 +41,7 @@ def test_objects_stand_free_of_each_other_and_of_the_camera() -> None:
 
 
 def test_bearings_point_at_the_middle_of_whole_objects() -> None:
-    for picture in render(scene(held_out("thesis"), 7_000, 0), exposed=True):
+    for picture in render(scene(judged("thesis", TRAIN_SEEDS), 7_000, 0), exposed=True):
         boxes, whole = picture.labels.boxes_xyxy, picture.labels.shares == 1.0
         inside = whole & (boxes[:, 0] > 0) & (boxes[:, 2] < 640) & (picture.labels.distances_m > 4)
         columns = 320 - np.tan(picture.bearings_rad[inside]) * 530.5
