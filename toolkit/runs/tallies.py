@@ -1,11 +1,14 @@
 """What the summary of a run counts in the messages that it writes, by message type."""
 
+from collections import Counter
 from collections.abc import Mapping
 from functools import singledispatch
 
+from toolkit.channels import MAP_FRAME
 from toolkit.messages.codec import Message
 from toolkit.messages.detections import Detections
 from toolkit.messages.match import LandmarkMatch
+from toolkit.messages.scene import SceneObjects
 
 
 @singledispatch
@@ -23,7 +26,10 @@ def _(match: LandmarkMatch) -> Mapping[str, int]:
 @tally.register
 def _(detections: Detections) -> Mapping[str, int]:
     """Detections by class."""
-    counts: dict[str, int] = {}
-    for hypotheses in detections.hypotheses:
-        counts[hypotheses[0][0]] = counts.get(hypotheses[0][0], 0) + 1
-    return counts
+    return Counter(hypotheses[0][0] for hypotheses in detections.hypotheses)
+
+
+@tally.register
+def _(scene: SceneObjects) -> Mapping[str, int]:
+    """Objects of a scene by class; a map is no scene."""
+    return {} if scene.frame_id == MAP_FRAME else Counter(scene.classes)

@@ -41,7 +41,7 @@ class FuseConfig:
     LiDAR's height; a class without gets its radius from the width of its boxes. A box and an object belong together if
     the chi-squares of their bearing and of its height and width are below `bearing_gate` and `size_gate`. Boxes are
     sure to `edge_px` and `edge_share` of their size, bearings to `bearing_sigma_deg`, and an object's parts that the
-    LiDAR meets lie within `lateral_m` of its middle. `prior_odds`, `hit_odds`, `confusion`, `miss_odds` and `max_odds` say
+    LiDAR meets lie within `lateral_m` of its middle. `prior_odds`, `hit_odds`, `confusion`, `miss_odds`, `max_odds` say
     how evidence adds up along a track: its odds of being of a class at first, how a detection raises them (at a score
     of 0.5), the share of that for every other class, what an image without it leaves of them if it would be
     `min_height_px` high there, and the most that they get. `rectified` images have no distortion and the projection

@@ -1,0 +1,53 @@
+"""Fuse detections in images with objects in scans."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from toolkit.cli import options
+from toolkit.cli.console import say, table
+from toolkit.cli.stage_runs import Given, finish, run_over
+
+if TYPE_CHECKING:
+    from toolkit.runs.pipeline import LogRun
+
+
+def command(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP) with detections and scan objects.")
+    ],
+    output: options.Output,
+    extrinsics: options.Extrinsics = None,
+    config_file: options.ConfigFile = None,
+    settings: options.Settings = None,
+    method: options.Method = None,
+    start: options.Start = None,
+    end: options.End = None,
+    remap: options.Remap = None,
+    odom: options.OdometryTopic = None,
+    results_only: options.ResultsOnly = False,
+    force: options.Force = False,
+    json: options.Json = False,
+) -> None:
+    """Give the objects in the scans of LOG... the classes that its detections have; write the input with scenes."""
+    span = options.span(start, end, remap, {"odometry": odom})
+    given = Given((config_file, settings, method), span, {"extrinsics": extrinsics}, None, results_only, force)
+    finish("fuse", run_over("fuse", ["fuse"], logs, output, given), _document, _print, json)
+
+
+def _document(run: "LogRun") -> dict[str, object]:
+    return {
+        "scans": run.outcome.bundles,
+        "unreadable": run.outcome.unreadable,
+        "objects": sum(run.outcome.counts.values()),
+        "classes": dict(run.outcome.counts),
+    }
+
+
+def _print(runs: "list[LogRun]") -> None:
+    rows = [[str(run.output), str(run.outcome.bundles), str(sum(run.outcome.counts.values()))] for run in runs]
+    table(["output", "scans", "objects"], rows)
+    for run in runs:
+        classes = ", ".join(f"{count} {name}" for name, count in run.outcome.counts.items())
+        say(f"{run.output}: {classes or 'nothing'}")
