@@ -8,7 +8,8 @@ import numpy as np
 
 from toolkit.geometry.se2 import Array, rotation
 from toolkit.lidar.beams import Beams
-from toolkit.lidar.centres import Noise, centres
+from toolkit.lidar.cells import Noise
+from toolkit.lidar.centres import centres
 from toolkit.lidar.segments import Segment, extent_m
 from toolkit.lidar.shapes import Shape
 from toolkit.lidar.windows import Cluster, windows
@@ -102,16 +103,15 @@ class _Explainer:
 
     def _explain(self, clusters: Sequence[Cluster]) -> None:
         window = windows(self._beams, clusters)
-        found = [centres(window, shape, self._noise) for shape in self._shapes]
+        found = centres(window, self._shapes, self._noise)
         for i, cluster in enumerate(clusters):
             point, spread = _surface(self._beams, cluster, float(window.spacing_m[i]), self._noise)
             hits = int(window.is_hit[i].sum())
             nothing = np.log(window.spacing_m[i]) - (hits - 1) * np.log(_UNKNOWN_M)
-            rows = [found[row] for row in self._row]
             self._known[cluster] = _Explained(
-                np.array([*(row.log_evidence[i] for row in rows), nothing]) + self._log_priors,
-                np.array([*(row.positions_xy[i] for row in rows), point]),
-                np.array([*(row.covariances[i] for row in rows), spread]),
+                np.append(found.log_evidence[i, self._row], nothing) + self._log_priors,
+                np.vstack([found.positions_xy[i, self._row], point]),
+                np.concatenate([found.covariances[i, self._row], spread[None]]),
             )
 
 

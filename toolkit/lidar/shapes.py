@@ -92,32 +92,30 @@ def box(length_m: float, width_m: float, corner_m: float = 0.0) -> Shape:
     return Shape(corners, boxes, turn_rad=np.pi)
 
 
-def _into_disc(feet: Array, ahead: Array, radius_m: float) -> Array:
-    """Depth at which rays through `feet` (..., 2) along unit vectors enter a disc about the origin."""
-    along = (feet * ahead).sum(axis=-1)
-    inside = along**2 - (feet**2).sum(axis=-1) + radius_m**2
-    return np.where(inside >= 0, -along - np.sqrt(np.maximum(inside, 0)), np.inf)
-
-
-def _into_box(feet: Array, ahead: Array, half_m: Array) -> Array:
-    """Depth at which rays through `feet` (..., 2) along unit vectors enter a box about the origin."""
-    safe = np.where(np.abs(ahead) < 1e-9, 1e-9, ahead)
-    first, second = (-half_m - feet) / safe, (half_m - feet) / safe
-    enter, leave = np.minimum(first, second).max(axis=-1), np.maximum(first, second).min(axis=-1)
-    return np.where(enter <= leave, enter, np.inf)
-
-
 def _depths(shape: Shape, headings: Array, offsets: Array, apart_m: float | None) -> Array:
     """Depths (headings, offsets) of a shape of one size."""
     discs = shape.discs
     if apart_m is not None:
         discs = tuple((0.0, side * apart_m / 2, shape.discs[0][2]) for side in (1, -1))
-    ahead = np.stack([np.cos(headings), np.sin(headings)], axis=-1)[:, None, :]
-    left = np.stack([-np.sin(headings), np.cos(headings)], axis=-1)[:, None, :]
+    c, s = np.cos(headings)[:, None], np.sin(headings)[:, None]
     nearest = np.full((len(headings), len(offsets)), np.inf)
-    feet = -offsets[None, :, None] * left
-    for x, y, radius in discs:
-        nearest = np.minimum(nearest, _into_disc(feet - (x, y), ahead, radius))
+    for x, y, radius in discs:  # the disc's centre is so far ahead, and to the left of the ray
+        ahead, left = c * x + s * y, c * y - s * x + offsets
+        nearest = np.minimum(nearest, np.where(np.abs(left) <= radius, ahead - _half_chord(radius, left), np.inf))
     for x, y, length, width in shape.boxes:
-        nearest = np.minimum(nearest, _into_box(feet - (x, y), ahead, np.array([length, width]) / 2))
+        nearest = np.minimum(nearest, _into_box((s * offsets - x, -c * offsets - y), (c, s), (length / 2, width / 2)))
     return nearest
+
+
+def _half_chord(radius_m: float, offset_m: Array) -> Array:
+    return np.sqrt(np.maximum(radius_m**2 - offset_m**2, 0.0))
+
+
+def _into_box(feet: tuple[Array, Array], ahead: tuple[Array, Array], half_m: tuple[float, float]) -> Array:
+    """Depth at which rays through `feet` (x, y) along unit vectors (x, y) enter a box about the origin."""
+    enter, leave = np.full(feet[0].shape, -np.inf), np.full(feet[0].shape, np.inf)
+    for foot, along, half in zip(feet, ahead, half_m, strict=True):
+        steep = np.where(np.abs(along) < 1e-9, 1e-9, along)
+        one, other = (-half - foot) / steep, (half - foot) / steep
+        enter, leave = np.maximum(enter, np.minimum(one, other)), np.minimum(leave, np.maximum(one, other))
+    return np.where(enter <= leave, enter, np.inf)

@@ -14,9 +14,9 @@ Cluster = tuple[Segment, ...]
 """The segments that make one object."""
 Floats = NDArray[np.float32]
 
-_BESIDE = np.array([1, 2, 3, 4, 6, 8, 12, 16, 24, 32])
-"""Which beams beside the outermost hits are looked at; the object ends near them, so they get sparser."""
-_MOST_HITS = 40
+_DENSE_M, _FAR_BESIDE_M, _APART_M = 0.65, 5.0, 0.03
+"""Beams are looked at beside the outermost hits: every one that is so far from the next, densely at first."""
+_MOST_HITS = 24
 _FAR_M = 1e4
 
 
@@ -47,10 +47,11 @@ class Windows:
     def __len__(self) -> int:
         return len(self.anchors_xy)
 
-    def within(self, rows: NDArray[np.intp], reach_m: float) -> "Windows":
-        """Some clusters, with the beams that pass within a distance of their outermost hits."""
-        near = self.beside_m[rows] <= reach_m
-        columns = np.flatnonzero((near & (self.is_hit[rows] | (self.ranges_m[rows] > 0))).any(axis=0))
+    def within(self, rows: NDArray[np.intp], reach_m: Array | None) -> "Windows":
+        """Some clusters, those that several rows ask for repeated, with the beams that pass near their outermost hits:
+        within distances (R,), or all of them."""
+        near = np.full((len(rows), 1), True) if reach_m is None else self.beside_m[rows] <= reach_m[:, None]
+        columns = np.flatnonzero((near & (self.ranges_m[rows] > 0)).any(axis=0))
         pick = np.ix_(rows, columns)
         return Windows(
             self.anchors_xy[rows],
@@ -59,7 +60,7 @@ class Windows:
             self.directions[pick],
             self.abreast_m[pick],
             self.offset_m[pick],
-            self.ranges_m[pick],
+            np.where(near, self.ranges_m[rows], np.float32(0))[:, columns],
             self.is_hit[pick],
             self.beside_m[pick],
             self.lateral_m[rows],
@@ -121,14 +122,24 @@ def _beams_of(beams: Beams, cluster: Cluster) -> tuple[NDArray[np.int64], NDArra
         first, last = _span(own, count)
         inner = _thinned(np.arange(first, last + 1))
         room = (count - (last - first + 1)) // 2 if beams.is_closed[sweep] else count
-        steps = _BESIDE[: np.searchsorted(_BESIDE, room, side="right")]
+        spacing = beams.spacing_rad[sweep] * float(beams.ranges_m[start + first % count])
+        steps = _beside(spacing, room)
         outer = np.concatenate([first - steps, last + steps])
-        metres = np.tile(steps, 2) * beams.spacing_rad[sweep] * float(beams.ranges_m[start + first % count])
+        metres = np.tile(steps, 2) * spacing
         inside = np.full(len(outer), True) if beams.is_closed[sweep] else (outer >= 0) & (outer < count)
         which.append(start + np.concatenate([inner, outer[inside]]) % count)
         away.append(np.concatenate([np.zeros(len(inner)), metres[inside]]))
     index = np.concatenate(which)
     return index, np.array([int(i) in hits for i in index], dtype=np.bool_), np.concatenate(away)
+
+
+def _beside(spacing_m: float, room: int) -> NDArray[np.int64]:
+    """How many beams away from the outermost hits to look, at most `room`."""
+    step = max(round(_APART_M / spacing_m), 1)
+    dense = np.arange(step, max(int(_DENSE_M / spacing_m), 3) + 1, step)
+    far = dense[-1] * 2 ** np.arange(1, int(np.log2(max(_FAR_BESIDE_M / (dense[-1] * spacing_m), 1))) + 1)
+    steps = np.unique(np.concatenate([[1, 2, 3], dense, far]))
+    return steps[steps <= room]
 
 
 def _span(segments: Sequence[Segment], count: int) -> tuple[int, int]:

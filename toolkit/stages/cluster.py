@@ -7,7 +7,7 @@ import numpy as np
 
 from toolkit.channels import ODOMETRY, SCAN, SCAN_FILTERED, SCAN_OBJECTS, SECOND_SCAN, TF_STATIC
 from toolkit.lidar.beams import Beams
-from toolkit.lidar.centres import Noise
+from toolkit.lidar.cells import Noise
 from toolkit.lidar.objects import Hypotheses, objects
 from toolkit.lidar.segments import Breaks, segments
 from toolkit.lidar.shapes import Shape
