@@ -21,13 +21,16 @@ MaybeOutput = Annotated[
     Path | None, typer.Option("-o", "--output", help="Where to write: a file, or a folder for several outputs.")
 ]
 MapFile = Annotated[Path, typer.Option("--map", help="Landmark database (SQLite file).")]
+MaybeMapFile = Annotated[Path | None, typer.Option("--map", help="Landmark database (SQLite file).")]
 ResultsOnly = Annotated[bool, typer.Option("--results-only", help="Write the new channels without the input's.")]
 Start = Annotated[str | None, typer.Option("--start", help="First log time: RFC 3339 or integer nanoseconds.")]
 End = Annotated[str | None, typer.Option("--end", help="Log time to stop before: RFC 3339 or integer nanoseconds.")]
 Remap = Annotated[list[str] | None, typer.Option("--remap", metavar="FROM=TO", help="Read topic FROM as TO.")]
 OdometryTopic = Annotated[str | None, typer.Option("--odom", help="Odometry topic, where the log has several.")]
 ImageTopic = Annotated[str | None, typer.Option("--image", help="Image topic, where the log has several.")]
-ScanTopic = Annotated[str | None, typer.Option("--scan", help="Scan topic, where the log has several.")]
+ScanTopics = Annotated[
+    list[str] | None, typer.Option("--scan", help="Scan topic, where the log has several; twice for two LiDARs.")
+]
 ImageRate = Annotated[
     float | None, typer.Option("--image-rate", metavar="HZ", help="Leave out images that come faster than this.")
 ]
@@ -48,16 +51,23 @@ Settings = Annotated[
 Method = Annotated[str | None, typer.Option("--method", help="Sets the method of every stage: default or thesis.")]
 
 
-def span(start: str | None, end: str | None, remaps: list[str] | None, topics: dict[str, str | None]) -> "Span":
-    """What of a log to read, from the options; `topics` by role, None where none was chosen.
+def span(
+    start: str | None, end: str | None, remaps: list[str] | None, topics: dict[str, str | list[str] | None]
+) -> "Span":
+    """What of a log to read, from the options; `topics` by role, None where none was chosen, of scans up to two.
 
     Raises:
-        UsageError: a time or a remapping cannot be read.
+        UsageError: a time or a remapping cannot be read, or there are too many topics.
     """
     from toolkit.runs.bundles import Span
     from toolkit.runs.inputs import Choice, parse_remaps
 
-    chosen = {role: topic for role, topic in topics.items() if topic}
+    chosen = {role: topic for role, topic in topics.items() if isinstance(topic, str) and topic}
+    for role, several in topics.items():
+        if isinstance(several, list):
+            if len(several) > 2:
+                raise UsageError(f"--{role} {' '.join(several)}: two are the most that are merged")
+            chosen.update(zip((role, f"second_{role}"), several, strict=False))
     return Span(Choice(chosen, parse_remaps(remaps or [])), time_ns(start, "--start"), time_ns(end, "--end"))
 
 

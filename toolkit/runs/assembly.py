@@ -55,8 +55,8 @@ def _declare(writer: RecordingWriter, own: Layer) -> dict[Connection, Connection
         connection = entry.connection
         if STAGE in connection.metadata:
             metadata = {name: text for name, text in connection.metadata.items() if name != STAGE}
-            connection = clean[connection] = replace(connection, metadata=metadata)
-        writer.declare(connection)
+            clean[connection] = replace(connection, metadata=metadata)
+        writer.declare(clean.get(connection, connection))
     return clean
 
 

@@ -92,6 +92,8 @@ def missing_stages(stage: Stage | Reduction, log: Log) -> list[str]:
         if not channel.topic.startswith(_OURS) or log.has(channel):
             continue
         producer = _producer(channel)
+        if producer.name in log.results and not log.own.channels:
+            continue
         try:
             names += [name for name in _chain_to(producer, log) if name not in names]
         except _LackingError as error:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.channels import ANNOTATIONS, CAMERA_IMAGE, ODOM_FRAME, ODOMETRY, TF, TF_STATIC
-from toolkit.errors import UsageError
+from toolkit.errors import RecordingError, UsageError
 from toolkit.manifest import RUN, Manifest, Outcome, StageRecord
 from toolkit.messages.codec import decode
 from toolkit.recording.blocks import Progress
@@ -36,7 +36,7 @@ def run_step(
     with create_recording(target) as writer:
         raws = _raws(stage, view, inputs, span, thinning, reading, progress)
         bundles = read_bundles(raws, inputs, stage.reads, reading)
-        for result in stage.process(bundles, step.config, step.files):
+        for result in _naming(view.path, stage.process(bundles, step.config, step.files)):
             if isinstance(result, Omission):
                 _omit(result, primary, reading)
             elif result.channel in writes:
@@ -81,6 +81,14 @@ def _raws(
         images = [connection for connection, channel in inputs.items() if channel == CAMERA_IMAGE]
         raws = thin(raws, images, odometry, thinning, reading.dropped)
     return chain(held_before(view, inputs, span.start_ns), raws)
+
+
+def _naming(path: Path, results: Iterator[Stamped | Omission]) -> Iterator[Stamped | Omission]:
+    """Results of a stage, which does not know where they come from; what it complains of gets the path of the log."""
+    try:
+        yield from results
+    except RecordingError as error:
+        raise RecordingError(f"{path}: {error}") from error
 
 
 def _omit(omission: Omission, primary: Connection, reading: Reading) -> None:
