@@ -70,3 +70,17 @@ def test_what_is_no_camera_is_said() -> None:
         CameraModel.of("omni", SIZE, K, PINHOLE)
     with pytest.raises(RecordingError, match="12 coefficients"):
         CameraModel.of("plumb_bob", SIZE, K, np.ones(12))
+
+
+@pytest.mark.parametrize(
+    ("name", "distortion"),
+    [("plumb_bob", np.array([-0.4, 0.05])), ("fisheye", np.array([-0.054, -0.078, 0.096, -0.052]))],
+)
+def test_what_lies_far_outside_is_not_folded_into_the_image(name: str, distortion: np.ndarray) -> None:
+    camera = CameraModel.of(name, SIZE, K, distortion)
+    angles = np.linspace(0.0, 1.5, 300)
+    u = camera.project(np.stack([np.sin(angles), np.zeros(300), np.cos(angles)], axis=-1))[:, 0]
+    shown = np.isfinite(u)
+    assert 100 < shown.sum() < 300
+    assert (np.diff(u[shown]) > 0).all()
+    assert not shown[-1]

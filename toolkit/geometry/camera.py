@@ -1,6 +1,6 @@
 """Cameras: from points to pixels and back, with the distortions that ROS and OpenCV know."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from toolkit.errors import RecordingError
 from toolkit.geometry.se2 import Array
 
-_STEPS, _SLOPE_OVER = 20, 1e-6
+_STEPS, _SLOPE_OVER, _WIDEST = 20, 1e-6, 10.0
 _PINHOLE, _FISHEYE = ("", "plumb_bob", "rational_polynomial"), ("equidistant", "fisheye")
 
 
@@ -24,6 +24,8 @@ class CameraModel:
     intrinsics: Array
     distortion: Array
     is_fisheye: bool
+    limit: float = np.inf
+    """The angle from the axis, or its tangent, up to which the distortion is good: farther out it folds back."""
 
     @classmethod
     def of(cls, name: str, size_px: tuple[int, int], intrinsics: Array, distortion: Array) -> "CameraModel":
@@ -44,19 +46,27 @@ class CameraModel:
         if len(distortion) > len(whole) and distortion[len(whole) :].any():
             raise RecordingError(f"the CameraInfo has {len(distortion)} coefficients of {name}; give {len(whole)}")
         whole[: len(distortion)] = distortion[: len(whole)]
-        return cls(size_px, intrinsics, whole, is_fisheye)
+        camera = cls(size_px, intrinsics, whole, is_fisheye)
+        outwards = np.linspace(0.0, np.pi if is_fisheye else _WIDEST, 2000)
+        bent = camera._bent(outwards) if is_fisheye else camera._distorted(outwards[:, None] * [1.0, 0.0])[:, 0]
+        folds = np.flatnonzero(np.diff(bent) <= 0)
+        return replace(camera, limit=float(outwards[folds[0]])) if len(folds) else camera
 
     def project(self, points: ArrayLike) -> Array:
-        """Pixels (..., 2) of points (..., 3) in the camera's frame; not a number where the camera cannot look."""
+        """Pixels (..., 2) of points (..., 3) in the camera's frame; not a number where the camera cannot look.
+
+        Where a calibration's distortion folds back, far outside the image, is where the camera cannot look either.
+        """
         x, y, z = np.moveaxis(np.asarray(points, dtype=np.float64), -1, 0)
         with np.errstate(divide="ignore", invalid="ignore"):
             if self.is_fisheye:
                 off = np.hypot(x, y)
                 angle = np.arctan2(off, z)
+                angle = np.where(angle <= self.limit, angle, np.nan)
                 scale = np.where(off > 0, self._bent(angle) / np.where(off > 0, off, 1.0), 0.0)
                 plane = np.stack([x * scale, y * scale], axis=-1)
             else:
-                ahead = np.where(z > 0, z, np.nan)
+                ahead = np.where((z > 0) & (np.hypot(x, y) <= self.limit * z), z, np.nan)
                 plane = self._distorted(np.stack([x / ahead, y / ahead], axis=-1))
         k = self.intrinsics
         u = k[0, 0] * plane[..., 0] + k[0, 1] * plane[..., 1] + k[0, 2]
@@ -91,7 +101,8 @@ class CameraModel:
         for _ in range(_STEPS):
             s = angle * angle
             slope = 1 + s * (3 * k1 + s * (5 * k2 + s * (7 * k3 + s * 9 * k4)))
-            angle = np.clip(angle - (self._bent(angle) - bent) / np.where(np.abs(slope) > 0.1, slope, 0.1), 0.0, np.pi)
+            angle = angle - (self._bent(angle) - bent) / np.where(np.abs(slope) > 0.1, slope, 0.1)
+            angle = np.clip(angle, 0.0, min(self.limit, np.pi))
         return angle
 
     def _distorted(self, plane: Array) -> Array:

@@ -15,7 +15,7 @@ class Weighing:
     """
 
     prior: float = 0.05
-    gain: float = 20.0
+    gain: float = 60.0
     confusion: float = 0.05
     missed: float = 0.5
     most: float = 1e4

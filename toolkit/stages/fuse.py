@@ -61,7 +61,7 @@ class FuseConfig:
     bearing_sigma_deg: Positive = 0.3
     lateral_m: Positive = 0.05
     prior_odds: Positive = 0.05
-    hit_odds: Positive = 20.0
+    hit_odds: Positive = 60.0
     confusion: Share = 0.05
     miss_odds: Share = 0.5
     max_odds: Positive = 1e4
