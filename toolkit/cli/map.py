@@ -30,7 +30,7 @@ def command(
     end: options.End = None,
     remap: options.Remap = None,
     odom: options.OdometryTopic = None,
-    scan: options.ScanTopic = None,
+    scan: options.ScanTopics = None,
     image: options.ImageTopic = None,
     model: options.Model = None,
     extrinsics: options.Extrinsics = None,

@@ -9,6 +9,7 @@ from toolkit import channels
 from toolkit.errors import UsageError
 from toolkit.messages.codec import Message
 from toolkit.messages.images import CameraInfo, CompressedImage, Image
+from toolkit.messages.points import PointCloud2
 from toolkit.messages.poses import Odometry, PoseStamped
 from toolkit.messages.scan import LaserScan
 from toolkit.messages.scene import SceneObjects
@@ -41,7 +42,8 @@ class Role:
 ROLES: Mapping[Channel[Any], Role] = {
     channels.CAMERA_IMAGE: Role("image", "--image", (CompressedImage, Image)),
     channels.CAMERA_INFO: Role("camera_info", "--remap", (CameraInfo,)),
-    channels.SCAN: Role("scan", "--scan", (LaserScan,)),
+    channels.SCAN: Role("scan", "--scan", (LaserScan,), (PointCloud2,)),
+    channels.SECOND_SCAN: Role("second_scan", "--scan", (), (LaserScan, PointCloud2)),
     channels.ODOMETRY: Role("odometry", "--odom", (Odometry,), (TFMessage, PoseStamped), channels.TF.topic),
     channels.SCENE_OBJECTS: Role("scene_objects", "--remap", (SceneObjects,)),
 }

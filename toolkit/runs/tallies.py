@@ -8,6 +8,7 @@ from toolkit.channels import MAP_FRAME
 from toolkit.messages.codec import Message
 from toolkit.messages.detections import Detections
 from toolkit.messages.match import LandmarkMatch
+from toolkit.messages.scan_objects import ScanObjects
 from toolkit.messages.scene import SceneObjects
 
 
@@ -33,3 +34,10 @@ def _(detections: Detections) -> Mapping[str, int]:
 def _(scene: SceneObjects) -> Mapping[str, int]:
     """Objects of a scene by class; a map is no scene."""
     return {} if scene.frame_id == MAP_FRAME else Counter(scene.classes)
+
+
+@tally.register
+def _(found: ScanObjects) -> Mapping[str, int]:
+    """Objects in scans by whether a known shape explains them."""
+    known = sum(options[0][1] > options[-1][1] for options in found.hypotheses)
+    return {"known": known, "unknown": len(found) - known}

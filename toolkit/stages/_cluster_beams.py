@@ -77,7 +77,7 @@ def _limits(config: ClusterConfig) -> Limits:
 
 
 def _sweep(scan: LaserScan, bundle: Bundle, base_from_lidar: Array, limits: Limits) -> Beams:
-    places = np.arange(len(scan.ranges_m))
+    places = np.arange(len(scan.ranges_m), dtype=np.float64)
     return sweep(
         scan.angle_min_rad + places * scan.angle_increment_rad,
         echoes(scan.ranges_m, scan.range_min_m, scan.range_max_m),
@@ -93,7 +93,7 @@ def _times_s(scan: LaserScan, stamp_ns: int) -> Array:
     turn_s = scan.time_increment_s * len(scan.ranges_m)
     step_s = scan.time_increment_s if 0 < turn_s <= _LONGEST_TURN_S else 0.0
     late_s = (scan.stamp_ns - stamp_ns) / 1e9 if scan.stamp_ns else 0.0
-    return late_s + step_s * np.arange(len(scan.ranges_m))
+    return late_s + step_s * np.arange(len(scan.ranges_m), dtype=np.float64)
 
 
 def _slice(cloud: PointCloud2, base_from_lidar: Array, config: ClusterConfig, limits: Limits) -> Beams:
