@@ -60,6 +60,10 @@ class ChannelDiff:
         self.messages.same += view.rows
         if view.items is not None:
             self.rows.same += len(view.items.labels)
+            if ids := view.items.ids:
+                names = {name: name for name in ids.values[:, 0].tolist()}
+                self._there.update(names)
+                self._back.update(names)
 
     def document(self) -> dict[str, object]:
         """An entry of `channels`."""
@@ -83,7 +87,7 @@ class ChannelDiff:
         """Compare the items of messages (N,) that belong together; which messages have any that is not the same."""
         pairs, tally = pair_items(baseline, candidate), self.rows
         mine, theirs = baseline.batch(times), candidate.batch(times)
-        ids = self._ids(baseline, candidate, pairs) if "id" in baseline.fields.columns and not baseline.keys else None
+        ids = self._ids(baseline, candidate, pairs) if baseline.ids else None
         changed = tally.compare(mine.take(pairs.baseline), theirs.take(pairs.candidate), ids)
         tally.only("removed", mine.take(pairs.removed))
         tally.only("added", theirs.take(pairs.added))
@@ -99,7 +103,7 @@ class ChannelDiff:
         What comes a second time has become the custom, so that one switch of tracks is one change.
         """
         sides = (baseline, pairs.baseline), (candidate, pairs.candidate)
-        ids = [items.fields.columns["id"].values[rows, 0].tolist() for items, rows in sides]
+        ids = [items.ids.values[rows, 0].tolist() for items, rows in sides if items.ids]
         places = [items.places[rows].tolist() for items, rows in sides]
         found = np.zeros(len(pairs.baseline), dtype=np.bool_)
         for row, (mine, theirs, place, other) in enumerate(zip(*ids, *places, strict=True)):

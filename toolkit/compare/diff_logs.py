@@ -14,7 +14,7 @@ from toolkit.compare.diff_pairs import pair_keys
 from toolkit.compare.diff_values import Rows
 from toolkit.compare.diff_view import Fields, View, unit_of, view
 from toolkit.errors import MessageError
-from toolkit.messages.columns import Column, Kind, Layout
+from toolkit.messages.columns import Column, Kind, Layout, layout_of
 from toolkit.messages.typestore import definition, typestore
 from toolkit.recording.blocks import Progress
 from toolkit.recording.reader import Recording
@@ -145,12 +145,12 @@ def shared_layout(connections: Collection[Connection]) -> Layout | None:
 def _layout(connection: Connection) -> Layout:
     if (connection.message_encoding, connection.schema_encoding) != ("cdr", "ros2msg"):
         raise MessageError(f"{connection.topic}: is not CDR described in ros2msg")
-    return Layout(connection.message_type, connection.schema.decode())
+    return layout_of(connection.message_type, connection.schema.decode())
 
 
 def _is_ours(ros_type: str, layout: Layout) -> bool:
     known = ros_type in typestore().fielddefs
-    return known and layout.definition == Layout(ros_type, definition(ros_type)).definition
+    return known and layout.definition == layout_of(ros_type, definition(ros_type)).definition
 
 
 def _side(

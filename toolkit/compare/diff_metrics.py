@@ -7,6 +7,7 @@ from pathlib import Path
 from toolkit.compare.metrics import NOWHERE, Outcome, Reference, evaluate
 from toolkit.compare.read import read_run
 from toolkit.compare.trajectory import interpolated
+from toolkit.errors import RecordingError
 from toolkit.landmarks.model import LandmarkMap, Source
 from toolkit.landmarks.scene import scene_from_map
 from toolkit.messages.match import Status
@@ -25,11 +26,14 @@ def metric_names() -> list[str]:
 def metric_rows(
     baseline: Path, candidate: Path, *, same_recording: bool
 ) -> tuple[dict[str, dict[str, float | None]], list[str]]:
-    """The figures of both by name, and what could not be read; none unless both have truth.
+    """The figures of both by name, and what could not be read; no figures unless both have truth and can be evaluated.
 
     Runs of the same recording may share the truth that one of them has.
     """
-    (mine, truth, losses), (theirs, other, more) = read_run(baseline), read_run(candidate)
+    try:
+        (mine, truth, losses), (theirs, other, more) = read_run(baseline), read_run(candidate)
+    except RecordingError:  # poses that are not finite, results of other types: the fields tell, figures cannot
+        return {}, []
     if same_recording:
         truth, other = truth.over(other), other.over(truth)
     losses = [f"{baseline}: {loss}" for loss in losses] + [f"{candidate}: {loss}" for loss in more]

@@ -33,7 +33,6 @@ _WORDS = {
     "bbox.center.theta": "box_theta",
     "bbox.size": "size_m",
     "scale": "size_m",
-    "points": "points_m",
 }
 
 
@@ -80,6 +79,11 @@ class Items:
     def messages(self) -> Rows:
         """The message (N,) that each is in."""
         return np.repeat(np.arange(len(self.counts)), self.counts)
+
+    @property
+    def ids(self) -> Column | None:
+        """Their ids (N, 1), where these are names that a run gives as it likes."""
+        return None if self.keys else self.fields.columns.get("id")
 
     @property
     def places(self) -> Rows:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
+from functools import lru_cache
 from struct import Struct
 from struct import error as struct_error
 from typing import Any
@@ -90,8 +91,15 @@ class Layout:
 
     def _rows(self) -> "_Rows":
         rows = _Rows(self.definition)
-        rows.add((Nodetype.NAME, self._type), "")
+        for name, node in self.definition[self._type]:
+            rows.add(node, name)
         return rows
+
+
+@lru_cache(maxsize=256)
+def layout_of(ros_type: str, schema: str) -> Layout:
+    """The layout of a type, made once; raises as `Layout`."""
+    return Layout(ros_type, schema)
 
 
 def _read(rows: "_Rows", data: bytes) -> None:

@@ -239,5 +239,5 @@ STAGE = Stage(
     process=process,
     resources=("model",),
     options=("names", "classifier"),
-    tolerance={"boxes_xyxy": 0.5, "hypotheses": 1e-4},
+    tolerance={"box_xyxy_px": 0.5, "score": 1e-4, "others.score": 1e-4, "points.points": 0.5, "texts.position": 0.5},
 )
