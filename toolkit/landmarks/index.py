@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import chain
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,35 +20,61 @@ _TRIANGLES = 200_000
 # Classes are one more coordinate of the trees, so far apart that no tolerance reaches over.
 _APART = 1e3
 _WIDEST = 400.0
+_SMALL = 10**6
 
 
-class _Lengths(NamedTuple):
-    """A tree over side lengths, and the numbers of class groups that its last coordinate counts."""
+class _Triples(NamedTuple):
+    """A tree over the sides of triangles, and the numbers of class triples that its last coordinate counts."""
 
     tree: cKDTree
     keys: Ints
 
     @classmethod
-    def of(cls, lengths: Array, numbers: Ints) -> "_Lengths":
-        keys, place = np.unique(numbers, return_inverse=True)
-        points = np.column_stack([lengths, place * _APART])
+    def of(cls, sides: Array, numbers: Ints) -> "_Triples":
+        keys, place = _ranks(numbers)
+        points = np.column_stack([sides, place * _APART])
         return cls(cKDTree(points, 32, balanced_tree=False, compact_nodes=False), keys)
 
-    def near(self, lengths: Array, numbers: Ints, tolerance: Array, most: int | None = None) -> tuple[Ints, Ints]:
-        """Which of Q queries (M,) each found member (M,) belongs to; those that find more than `most` find none."""
-        if not len(lengths) or not len(self.keys):
+    def near(self, sides: Array, numbers: Ints, tolerance: Array) -> tuple[Ints, Ints]:
+        """Which of Q queries (M,) each found triangle (M,) belongs to."""
+        if not len(sides) or not len(self.keys):
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
         place = np.minimum(np.searchsorted(self.keys, numbers), len(self.keys) - 1)
         known = np.flatnonzero(self.keys[place] == numbers)
-        points = np.column_stack([lengths[known], place[known] * _APART])
+        points = np.column_stack([sides[known], place[known] * _APART])
         radius = np.minimum(tolerance[known], _WIDEST)
-        if most is not None:
-            few = self.tree.query_ball_point(points, radius, p=np.inf, workers=2, return_length=True) <= most
-            points, radius, known = points[few], radius[few], known[few]
         lists = self.tree.query_ball_point(points, radius, p=np.inf, workers=2)
         counts = np.fromiter(map(len, lists), dtype=np.int64, count=len(lists))
         member = np.fromiter(chain.from_iterable(lists), dtype=np.int64, count=int(counts.sum()))
         return np.repeat(known, counts), member
+
+
+class _Doubles(NamedTuple):
+    """Pairs by class pair and length: class pairs lie so far apart on one line that no tolerance reaches over."""
+
+    place: Array
+    member: Ints
+    step_m: float
+    kinds: int
+
+    @classmethod
+    def of(cls, lengths: Array, numbers: Ints) -> "_Doubles":
+        step_m = 4 * float(lengths.max(initial=1.0))
+        place = numbers * step_m + lengths
+        member = np.argsort(place, kind="stable")
+        kinds = int(np.count_nonzero(np.diff(numbers[member]))) + (len(member) > 0)
+        return cls(place[member], member, step_m, kinds)
+
+    def near(self, lengths: Array, numbers: Ints, tolerance: Array, most: int) -> tuple[Ints, Ints]:
+        """Which of Q queries (M,) each found pair (M,) belongs to; those that find more than `most` find none."""
+        place = numbers * self.step_m
+        length, reach = np.minimum(lengths, self.step_m / 2), np.minimum(tolerance, self.step_m / 4)
+        first = np.searchsorted(self.place, place + length - reach)
+        count = np.searchsorted(self.place, place + length + reach, side="right") - first
+        count[count > most] = 0
+        query = np.repeat(np.arange(len(lengths)), count)
+        within = np.arange(len(query)) - np.repeat(np.cumsum(count) - count, count)
+        return query, self.member[first[query] + within]
 
 
 class Hits(NamedTuple):
@@ -78,8 +104,8 @@ class MapIndex:
     places: cKDTree
     triangles: NDArray[np.int32]
     pairs: NDArray[np.int32]
-    _by_sides: _Lengths
-    _by_length: _Lengths
+    _by_sides: _Triples
+    _by_length: _Doubles
 
     @classmethod
     def build(cls, landmark_map: LandmarkMap) -> "MapIndex":
@@ -94,7 +120,7 @@ class MapIndex:
         names, class_of = np.unique([landmark_map.classes[i] for i in rows], return_inverse=True)
         places = cKDTree(positions, balanced_tree=False)
         near = _neighbours(places, positions)
-        triangles = _canonical(_triangles(near), positions, class_of)
+        triangles, sides, triples = _canonical(_triangles(near), positions, class_of)
         pairs = _pairs(near, class_of)
         return cls(
             landmark_map,
@@ -107,8 +133,8 @@ class MapIndex:
             places,
             triangles,
             pairs,
-            _Lengths.of(side_lengths(positions[triangles]), _number(class_of[triangles], len(names))),
-            _Lengths.of(side_lengths(positions[pairs])[:, :1], _number(class_of[pairs], len(names))),
+            _Triples.of(sides, triples),
+            _Doubles.of(side_lengths(positions[pairs])[:, 0], _number(class_of[pairs], len(names))),
         )
 
     def __len__(self) -> int:
@@ -117,7 +143,7 @@ class MapIndex:
     @property
     def kinds_of_pairs(self) -> int:
         """How many different pairs of classes there are."""
-        return len(self._by_length.keys)
+        return self._by_length.kinds
 
     @property
     def small(self) -> bool:
@@ -152,7 +178,7 @@ class MapIndex:
         query = np.concatenate([np.arange(len(lengths)), np.flatnonzero(both)])
         swap = np.concatenate([swap, np.ones(int(both.sum()), dtype=np.bool_)])
         number = _number(np.sort(classes[query], axis=1), len(self.names))
-        found, member = self._by_length.near(lengths[query, None], number, tolerance[query], most)
+        found, member = self._by_length.near(lengths[query], number, tolerance[query], most)
         landmarks = self.pairs[member].astype(np.int64)
         return Hits(query[found], np.where(swap[found, None], landmarks[:, ::-1], landmarks))
 
@@ -172,6 +198,17 @@ def first_corner(classes: Ints, count: int) -> Ints:
 def _number(classes: Ints, count: int) -> Ints:
     number: Ints = classes @ (count ** np.arange(classes.shape[1])[::-1])
     return number
+
+
+def _ranks(numbers: Ints) -> tuple[Ints, Ints]:
+    """As `numpy.unique` with its inverse, without sorting where the numbers are small."""
+    if numbers.max(initial=0) > _SMALL:
+        keys, place = np.unique(numbers, return_inverse=True)
+        return keys, place
+    keys = np.flatnonzero(np.bincount(numbers))
+    rank = np.zeros(numbers.max(initial=0) + 1, dtype=np.int64)
+    rank[keys] = np.arange(len(keys))
+    return keys, rank[numbers]
 
 
 def _extent(places: cKDTree, positions: Array) -> tuple[float, float]:
@@ -201,25 +238,42 @@ def _pairs(near: Ints, class_of: Ints) -> NDArray[np.int32]:
     return np.where(swap[:, None], pairs[:, ::-1], pairs).astype(np.int32)
 
 
-def _triangles(near: Ints) -> Ints:
-    """Each landmark with any two of its neighbours; those found from several corners once."""
+def _triangles(near: Ints) -> NDArray[np.int32]:
+    """Corners (3, T): each landmark with any two of its neighbours; those found from several corners once."""
     n, count = near.shape
-    first, second = np.triu_indices(count, 1)
+    near = near.astype(np.int32)
+    own = np.arange(n, dtype=np.int32)
+    # A neighbour of lower number that lists this landmark too has the triangle, if it lists the third one as well.
+    first = [(near[near[:, i]] == own[:, None]).any(axis=1) & (near[:, i] < own) for i in range(count)]
     parts = []
-    for i, j in zip(first, second, strict=True):
-        a, b, c = np.arange(n), near[:, i], near[:, j]
-        from_b = (near[b] == a[:, None]).any(axis=1) & (near[b] == c[:, None]).any(axis=1)
-        from_c = (near[c] == a[:, None]).any(axis=1) & (near[c] == b[:, None]).any(axis=1)
-        keep = ~(from_b & (b < a)) & ~(from_c & (c < a))
-        parts.append(np.stack([a, b, c], axis=1)[keep])
-    return np.concatenate(parts) if parts else np.zeros((0, 3), dtype=np.int64)
+    for i, j in zip(*np.triu_indices(count, 1), strict=True):
+        b, c = near[:, i], near[:, j]
+        has = np.zeros(n, dtype=np.bool_)
+        for corner, third, rows in ((b, c, np.flatnonzero(first[i])), (c, b, np.flatnonzero(first[j]))):
+            has[rows] |= (near[corner[rows]] == third[rows, None]).any(axis=1)
+        parts.append(np.stack([own, b, c])[:, ~has])
+    return np.concatenate(parts, axis=1) if parts else np.zeros((3, 0), dtype=np.int32)
 
 
-def _canonical(triangles: Ints, positions: Array, class_of: Ints) -> NDArray[np.int32]:
-    """Counter-clockwise, from the corner where the classes read lowest."""
-    corner = positions[triangles]
-    u, v = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    left = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] >= 0
-    triangles = np.where(left[:, None], triangles, triangles[:, [0, 2, 1]])
-    turn = first_corner(class_of[triangles], int(class_of.max()) + 1)
-    return np.take_along_axis(triangles, (turn[:, None] + np.arange(3)) % 3, axis=1).astype(np.int32)
+def _canonical(corners: NDArray[np.int32], positions: Array, class_of: Ints) -> tuple[NDArray[np.int32], Array, Ints]:
+    """Triangles (T, 3) counter-clockwise, from the corner where the classes read lowest.
+
+    With their sides (T, 3), 01, 12, 20, and the number (T,) of their classes.
+    """
+    (ax, bx, cx), (ay, by, cy) = (coordinate[corners] for coordinate in positions.T.copy())
+    left = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) >= 0
+    ab, bc, ca = (np.sqrt(x * x + y * y) for x, y in ((bx - ax, by - ay), (cx - bx, cy - by), (ax - cx, ay - cy)))
+    ab, ca = np.where(left, ab, ca), np.where(left, ca, ab)
+    a, b, c = corners[0], np.where(left, corners[1], corners[2]), np.where(left, corners[2], corners[1])
+    count = int(class_of.max()) + 1
+    p, q, r = class_of[a], class_of[b], class_of[c]
+    from_a, from_b, from_c = (p * count + q) * count + r, (q * count + r) * count + p, (r * count + p) * count + q
+    lowest = np.minimum(np.minimum(from_a, from_b), from_c)
+    at_a = from_a == lowest
+    at_b = (from_b == lowest) & ~at_a
+
+    def turned(*of: NDArray[Any]) -> NDArray[Any]:
+        rows = [np.where(at_a, of[i], np.where(at_b, of[i - 2], of[i - 1])) for i in range(3)]
+        return np.stack(rows, axis=1)
+
+    return turned(a, b, c), turned(ab, bc, ca), lowest
