@@ -7,8 +7,10 @@ import inspect
 import pytest
 
 from toolkit import channels
+from toolkit.compare.diff_logs import Topic
+from toolkit.messages.typestore import definition
 from toolkit.runs.config import effective, stage_config
-from toolkit.stage import Channel, Reduction, Stage
+from toolkit.stage import Channel, Connection, Reduction, Stage, Tolerance
 from toolkit.stages import find_stage, stage_names
 
 KNOWN = {value.topic for value in vars(channels).values() if isinstance(value, Channel)}
@@ -33,6 +35,17 @@ def test_a_stage_has_its_shape(name: str) -> None:
     else:
         assert isinstance(stage, Reduction)
         assert (stage.collect, stage.solve) == (module.collect, module.solve)
+
+
+@pytest.mark.parametrize("name", stage_names())
+def test_tolerances_are_of_fields_that_diff_compares(name: str) -> None:
+    stage = find_stage(name)
+    known = set()
+    for channel in stage.writes:
+        ros_type = channel.message.ROS_TYPE
+        connection = Connection(channel.topic, ros_type, definition(ros_type).encode())
+        known.update(Topic.of((connection,), (), lambda _field: Tolerance()).field_names())
+    assert set(stage.tolerance) <= known, f"{name} writes {sorted(known)}"
 
 
 @pytest.mark.parametrize("name", stage_names())

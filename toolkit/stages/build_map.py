@@ -93,5 +93,5 @@ STAGE = Reduction(
     config=BuildMapConfig,
     collect=collect,
     solve=solve,
-    tolerance={"position_m": 1e-4, "orientation": 1e-5},
+    tolerance={"position_m": 1e-4, "orientation": 1e-5, "size_m": 1e-4},
 )

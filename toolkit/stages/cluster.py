@@ -84,5 +84,14 @@ STAGE = Stage(
     config=ClusterConfig,
     process=process,
     options=("extrinsics",),
-    tolerance={"positions_xy": 1e-3, "covariances": 1e-3, "hypotheses": 1e-2, "extents_m": 1e-6},
+    tolerance={
+        "position_m": 1e-3,
+        "others.position_m": 1e-3,
+        "covariance": 1e-3,
+        "others.covariance": 1e-3,
+        "score": 1e-2,
+        "others.score": 1e-2,
+        "size_m": 2e-6,
+        "box_offset_m": 1e-3,
+    },
 )

@@ -169,5 +169,13 @@ STAGE = Stage(
     config=FuseConfig,
     process=process,
     options=("extrinsics",),
-    tolerance={"positions_xy": 1e-6, "covariances": 1e-8, "hypotheses": 1e-6, "radii_m": 1e-6},
+    tolerance={
+        "position_m": 1e-6,
+        "others.position_m": 1e-6,
+        "covariance": 1e-8,
+        "others.covariance": 1e-8,
+        "score": 1e-6,
+        "others.score": 1e-6,
+        "size_m": 2e-6,
+    },
 )

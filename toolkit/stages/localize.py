@@ -29,7 +29,7 @@ from toolkit.messages.match import Status
 from toolkit.messages.poses import PoseStamped, PoseWithCovarianceStamped
 from toolkit.messages.scene import SceneObjects
 from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.stage import Bundle, OdometryAt, Stage, Stamped
+from toolkit.stage import Bundle, OdometryAt, Stage, Stamped, Tolerance
 from toolkit.stages._localize_joined import JoinedLocator
 from toolkit.stages._localize_thesis import locate_as_in_the_thesis
 from toolkit.stages._localize_unique import UniqueLocator
@@ -141,5 +141,15 @@ STAGE = Stage(
     config=LocalizeConfig,
     process=process,
     resources=("map",),
-    tolerance={"position_m": 1e-6, "orientation": 1e-7, "residual_m": 1e-6},
+    tolerance={
+        "position_m": 1e-6,
+        "orientation": 1e-7,
+        "translation_m": 1e-4,
+        "rotation": 1e-7,
+        "covariance": Tolerance(1e-12, 1e-6),
+        "residual_m": 1e-6,
+        "candidate_scores": Tolerance(1e-6, 1e-6),
+        "expected_accidental": Tolerance(1e-12, 1e-4),
+        "chi2": Tolerance(1e-6, 1e-6),
+    },
 )
