@@ -17,11 +17,12 @@ from toolkit.stage import Stamped
 from toolkit.vision.session import Session
 
 STEP_NS = 200_000_000
+STEP_M = 0.02
 COUNT = 8
 
 
 def raw_log(path: Path, count: int = COUNT) -> Path:
-    """A robot that drives past two posts, 0.1 m per image."""
+    """A robot that creeps towards a person and a fire hydrant, `STEP_M` per image."""
     with create_recording(path) as writer:
         for stamped in raw_messages(count):
             writer.add(stamped)
@@ -30,7 +31,7 @@ def raw_log(path: Path, count: int = COUNT) -> Path:
 
 def raw_messages(count: int = COUNT) -> list[Stamped]:
     """Its messages, by time."""
-    camera = np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]])
+    camera = np.array([[60.0, 0, 32], [0, 60, 36], [0, 0, 1]])
     info = CameraInfo(1, "camera", 48, 64, "plumb_bob", np.zeros(5), camera, np.eye(3), np.eye(3, 4))
     optical = np.array([-0.5, 0.5, -0.5, 0.5])
     transforms = (
@@ -42,9 +43,9 @@ def raw_messages(count: int = COUNT) -> list[Stamped]:
         now = (i + 1) * STEP_NS
         frames = ("odom", "base_footprint")
         found += [
-            Stamped(ODOMETRY, now, Odometry.planar(now, frames, np.array([0.1 * i, 0, 0]), np.zeros((3, 3)))),
+            Stamped(ODOMETRY, now, Odometry.planar(now, frames, np.array([STEP_M * i, 0, 0]), np.zeros((3, 3)))),
             Stamped(CAMERA_IMAGE, now, CompressedImage(now, "camera", "jpeg", _picture(i))),
-            Stamped(SCAN, now, _scan(now)),
+            Stamped(SCAN, now, _scan(now, STEP_M * i)),
         ]
     return found
 
@@ -53,17 +54,22 @@ def _picture(i: int) -> bytes:
     return bytes(cv2.imencode(".jpg", np.full((48, 64, 3), 20 * (i % 12), np.uint8))[1].tobytes())
 
 
-def _scan(now: int) -> LaserScan:
-    ranges = np.full(90, np.inf, np.float32)
-    ranges[[0, 1, 89]], ranges[[6, 7]] = 2.0, 3.0
-    step = 2 * np.pi / 90
-    return LaserScan(now, "base_scan", 0.0, 89 * step, step, 0.0, 0.1, 0.1, 10.0, ranges, np.zeros(0, np.float32))
+def _scan(now: int, x_m: float) -> LaserScan:
+    bearings = np.arange(180) * np.deg2rad(2)
+    ranges = np.full(180, np.inf)
+    for centre, radius_m in (((3.0, 0.0), 0.25), ((2.8, 1.03), 0.15)):
+        along = (centre[0] - x_m) * np.cos(bearings) + centre[1] * np.sin(bearings)
+        beside = (centre[0] - x_m) * np.sin(bearings) - centre[1] * np.cos(bearings)
+        hit = (along > 0) & (np.abs(beside) < radius_m)
+        ranges[hit] = along[hit] - np.sqrt(radius_m**2 - beside[hit] ** 2)
+    step, none = np.deg2rad(2), np.zeros(0, np.float32)
+    return LaserScan(now, "base_scan", 0.0, 179 * step, step, 0.0, 0.1, 0.1, 10.0, ranges.astype(np.float32), none)
 
 
 def two_posts(path: Path) -> Path:
     """A detector that sees a person and a fire hydrant in every image."""
     output = np.zeros((1, 252, 7), np.float32)
-    output[0, :2] = (32, 32, 12, 40, 0.9, 1, 0), (10, 32, 8, 20, 0.8, 0, 1)
+    output[0, :2] = (32, 31, 10, 34, 0.9, 1, 0), (10, 40, 7, 16, 0.8, 0, 1)
     return answering(path, {"output0": output}, {"names": "['person', 'fire hydrant']", "stride": "32"})
 
 

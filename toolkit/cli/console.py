@@ -21,13 +21,13 @@ def run_command(application: Callable[..., object], arguments: Sequence[str]) ->
     except ToolkitError as error:
         warn(f"error: {error}")
         return error.exit_code
-    except KeyboardInterrupt:
-        warn("interrupted; nothing unfinished was left behind")
-        return INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
-    except SystemExit as stop:
+    except (SystemExit, KeyboardInterrupt) as stop:
+        if isinstance(stop, KeyboardInterrupt) or stop.code == INTERRUPTED:  # typer makes the one of the other
+            warn("interrupted; nothing unfinished was left behind, and the next run goes on from finished stages")
+            return INTERRUPTED
         return stop.code if isinstance(stop.code, int) else DONE
     return DONE
 
