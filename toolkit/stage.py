@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Generic, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.geometry.se2 import Array
 from toolkit.messages.codec import M, Message
@@ -63,12 +64,21 @@ class Stamped:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Steps:
+    """Odometry messages around a moment: stamps_ns (K,), rising, and odom_from_base (K, 3)."""
+
+    stamps_ns: NDArray[np.int64]
+    odom_from_base: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class OdometryAt:
     """Odometry at one moment: odom_from_base (3,) x, y, heading in `frame_id`, and the (3, 3) covariance it came with.
 
     The covariance is that of the message before; all zero where the log leaves it unknown. `way_m` and `turned_rad` are
     the length of the path and the sum of all turning since the log began, so that a loop back to the start counts.
     `velocity` (3,) is the base's own: forward and left in m/s and turning in rad/s, over the two messages around.
+    `steps` are there where the bundle's message took a while to measure, and span that while if the log does.
     """
 
     frame_id: str
@@ -77,6 +87,7 @@ class OdometryAt:
     way_m: float
     turned_rad: float
     velocity: Array = field(default_factory=lambda: np.zeros(3))
+    steps: Steps | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.geometry.angles import wrap
-from toolkit.geometry.se2 import Array, compose, exp
+from toolkit.geometry.se2 import Array, compose
 
 _SEAM = 2.5
 """Beams that are so many times farther apart than most have something between them that nobody looked at."""
@@ -64,14 +64,13 @@ def sweep(
     angles_rad: Array,
     ranges_m: Array,
     base_from_lidar: Array,
-    times_s: Array | None = None,
-    velocity: Array | None = None,
+    base_from_then: Array | None = None,
     limits: Limits | None = None,
 ) -> Beams:
     """The beams of one LiDAR: angles and ranges (N,) in its frame, mounted at `base_from_lidar` (4, 4), tilted or not.
 
-    With `times_s` (N,) after the moment that is asked for and the base's `velocity` (3,), forward and left in m/s and
-    turning in rad/s, every beam leaves from where the LiDAR was then.
+    `base_from_then` (N, 3) says where the base was at the time of each beam, in the base frame of the moment that is
+    asked for.
     """
     limits = limits or Limits()
     directions = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=1) @ base_from_lidar[:2, :2].T
@@ -82,8 +81,8 @@ def sweep(
             np.arctan2(directions[:, 1], directions[:, 0]),
         ]
     )
-    if times_s is not None and velocity is not None:
-        mounted = compose(exp(times_s[:, None] * velocity), mounted)
+    if base_from_then is not None:
+        mounted = compose(base_from_then, mounted)
     angle = wrap(mounted[:, 2])
     ranges = np.where((ranges_m >= limits.range_m[0]) & (ranges_m <= limits.range_m[1]), ranges_m * flat, np.inf)
     order = np.argsort(angle, kind="stable")

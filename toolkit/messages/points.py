@@ -60,11 +60,11 @@ class PointCloud2:
                 raise MessageError(f"the {name} of a point cloud is of type {fields[name].datatype}, not a float")
             formats.append(order + kind)
             offsets.append(fields[name].offset)
-        point = {"names": ["x", "y", "z"], "formats": formats, "offsets": offsets, "itemsize": ros.point_step}
+        point: Any = {"names": ["x", "y", "z"], "formats": formats, "offsets": offsets, "itemsize": ros.point_step}
         rows = np.ascontiguousarray(ros.data).reshape(-1)
         if len(rows) < ros.height * ros.row_step or ros.row_step < ros.width * ros.point_step:
             raise MessageError(f"a point cloud of {ros.width} x {ros.height} points has {len(rows)} bytes only")
         rows = rows[: ros.height * ros.row_step].reshape(ros.height, -1)[:, : ros.width * ros.point_step]
         points = np.frombuffer(np.ascontiguousarray(rows).data, dtype=np.dtype(point))
-        xyz = np.column_stack([points[name].astype(np.float32) for name in "xyz"])
+        xyz = np.stack([np.asarray(points[name], dtype=np.float32) for name in "xyz"], axis=1)
         return cls(stamp_from_ros(ros.header.stamp), ros.header.frame_id, xyz)

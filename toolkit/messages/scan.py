@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 from toolkit.messages.parts import header_to_ros, make, stamp_from_ros
 
+LONGEST_S = 2.0
+"""Beams that are said to take longer than this for a turn have times that make no sense."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LaserScan:
@@ -29,6 +32,12 @@ class LaserScan:
     range_max_m: float
     ranges_m: NDArray[np.float32]
     intensities: NDArray[np.float32]
+
+    @property
+    def duration_ns(self) -> int:
+        """How long after the stamp the last beam is; 0 where the scan does not say, or says what cannot be."""
+        turn_s = self.time_increment_s * max(len(self.ranges_m) - 1, 0)
+        return round(turn_s * 1e9) if 0 < turn_s <= LONGEST_S else 0
 
     def to_ros(self) -> Any:
         """See `Message`."""

@@ -2,7 +2,7 @@
 
 from collections import Counter, deque
 from collections.abc import Collection, Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from toolkit.messages.codec import Message
@@ -94,21 +94,25 @@ class _Table:
         while self._waiting:
             first = self._waiting[0]
             out_of_time = log_time_ns is None or log_time_ns - first.log_time_ns > WINDOW_NS
-            if not (out_of_time or self._is_complete(first.stamp_ns)):
+            if not (out_of_time or self._is_complete(first)):
                 return
             yield self._finish(self._waiting.popleft())
         if log_time_ns is None:
             for channel, partners in self._beside.items():
                 self._counts.unpaired[channel.topic] += len(partners.messages)
 
-    def _is_complete(self, stamp_ns: int) -> bool:
-        if self._trail is not None and self._trail.latest_ns < stamp_ns:
+    def _is_complete(self, bundle: Bundle) -> bool:
+        stamp_ns = bundle.stamp_ns
+        if self._trail is not None and self._trail.latest_ns < stamp_ns + self._duration_ns(bundle):
             return False
         if any(held.latest is None for held in self._held.values()):
             return False
         # A later bundle may be nearer to a message that is near to this one.
         rivals_known = not self._beside or self._stamps[-1] > stamp_ns + 2 * BESIDE_NS
         return rivals_known and all(partners.passed(stamp_ns) for partners in self._beside.values())
+
+    def _duration_ns(self, bundle: Bundle) -> int:
+        return getattr(bundle.messages[self._primary], "duration_ns", 0)
 
     def _finish(self, bundle: Bundle) -> Bundle:
         counts, found = self._counts, dict(bundle.messages)
@@ -117,6 +121,9 @@ class _Table:
         if self._trail is not None:
             odometry = self._trail.at(bundle.stamp_ns)
             counts.without_odometry += odometry is None
+            duration_ns = self._duration_ns(bundle)
+            if odometry is not None and duration_ns:
+                odometry = replace(odometry, steps=self._trail.around(bundle.stamp_ns, duration_ns))
         found.update({channel: held.latest for channel, held in self._held.items() if held.latest is not None})
         for channel, partners in self._beside.items():
             partner = partners.pick(bundle.stamp_ns, self._stamps)

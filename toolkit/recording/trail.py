@@ -3,6 +3,7 @@
 import math
 from bisect import bisect_left
 from collections import deque
+from itertools import islice
 
 import numpy as np
 
@@ -10,12 +11,13 @@ from toolkit.geometry.se2 import between, interpolate, log
 from toolkit.messages.codec import Message
 from toolkit.messages.poses import Odometry, PoseStamped
 from toolkit.messages.transforms import TFMessage
-from toolkit.stage import OdometryAt
+from toolkit.stage import OdometryAt, Steps
 
 WIDEST_GAP_NS = 2 * 10**9
 """The widest gap that odometry is interpolated over."""
 
 _KEPT_NS = 3 * WIDEST_GAP_NS
+_AROUND_NS = 300_000_000
 _BASES = ("base_footprint", "base_link")
 
 
@@ -72,6 +74,14 @@ class Trail:
         while self._stamps[0] < stamp_ns - _KEPT_NS and len(self._stamps) > 2:
             self._stamps.popleft()
             self._steps.popleft()
+
+    def around(self, stamp_ns: int, duration_ns: int) -> Steps:
+        """The messages from a little before a time to a little after a while later."""
+        left = max(bisect_left(self._stamps, stamp_ns - _AROUND_NS) - 1, 0)
+        right = bisect_left(self._stamps, stamp_ns + duration_ns + _AROUND_NS) + 1
+        steps = list(islice(self._steps, left, right))
+        stamps = np.array(list(islice(self._stamps, left, right)), dtype=np.int64)
+        return Steps(stamps, np.array([step.odom_from_base for step in steps]).reshape(-1, 3))
 
     def at(self, stamp_ns: int) -> OdometryAt | None:
         """Odometry at a time between two stamps that are close enough together, else None."""

@@ -110,6 +110,6 @@ def _roles(present: Collection[tuple[str, str]]) -> dict[str, list[str]]:
     """Topics by role; truth and results go by their names, everything else by message type."""
     named = {topic for topics in _BY_TOPIC.values() for topic in topics}
     others = [(topic, kind) for topic, kind in present if topic not in named]
-    roles = {role.name: topics_for(role, others) for role in ROLES.values()}
+    roles = {role.name: topics_for(role, others) for role in ROLES.values() if role.messages}
     topics = {topic for topic, _ in present}
     return roles | {name: [topic for topic in known if topic in topics] for name, known in _BY_TOPIC.items()}

@@ -1,22 +1,21 @@
 """Scans and point clouds of a bundle as beams in the base frame."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.channels import BASE_FRAME, SCAN, SECOND_SCAN, TF_STATIC
 from toolkit.errors import RecordingError, UsageError
 from toolkit.geometry import frames
-from toolkit.geometry.se2 import Array
+from toolkit.geometry.se2 import Array, between, exp, interpolate
 from toolkit.lidar.beams import Beams, Limits, echoes, sweep, together
 from toolkit.lidar.clouds import slice_cloud
 from toolkit.messages.codec import Message
 from toolkit.messages.points import PointCloud2
 from toolkit.messages.scan import LaserScan
-from toolkit.stage import Bundle
+from toolkit.stage import Bundle, OdometryAt
 from toolkit.stages._cluster_config import ClusterConfig
 from toolkit.stages._mounting import Mounting
 
-_LONGEST_TURN_S = 2.0
-"""Beams that are said to take longer than this have times that make no sense."""
 _BASES = (BASE_FRAME, "base_link")
 
 
@@ -82,18 +81,25 @@ def _sweep(scan: LaserScan, bundle: Bundle, base_from_lidar: Array, limits: Limi
         scan.angle_min_rad + places * scan.angle_increment_rad,
         echoes(scan.ranges_m, scan.range_min_m, scan.range_max_m),
         base_from_lidar,
-        _times_s(scan, bundle.stamp_ns),
-        None if bundle.odometry is None else bundle.odometry.velocity,
+        None if bundle.odometry is None else _moved(bundle.odometry, bundle.stamp_ns, _times_ns(scan, bundle.stamp_ns)),
         limits,
     )
 
 
-def _times_s(scan: LaserScan, stamp_ns: int) -> Array:
-    """When each beam (N,) was, after a time; all at once where the scan does not say."""
-    turn_s = scan.time_increment_s * len(scan.ranges_m)
-    step_s = scan.time_increment_s if 0 < turn_s <= _LONGEST_TURN_S else 0.0
-    late_s = (scan.stamp_ns - stamp_ns) / 1e9 if scan.stamp_ns else 0.0
-    return late_s + step_s * np.arange(len(scan.ranges_m), dtype=np.float64)
+def _times_ns(scan: LaserScan, stamp_ns: int) -> NDArray[np.int64]:
+    """When each beam (N,) was; all at once where the scan does not say."""
+    first_ns, count = scan.stamp_ns or stamp_ns, len(scan.ranges_m)
+    return first_ns + np.arange(count, dtype=np.int64) * scan.duration_ns // max(count - 1, 1)
+
+
+def _moved(odometry: OdometryAt, stamp_ns: int, times_ns: NDArray[np.int64]) -> Array:
+    """Where the base was at some times (N, 3), in the base frame at another."""
+    steps = odometry.steps
+    if steps is None or not (len(steps.stamps_ns) > 1 and steps.stamps_ns[0] <= times_ns[0]):
+        return exp((times_ns - stamp_ns)[:, None] / 1e9 * odometry.velocity)
+    # What the log does not tell any more is little: a bundle waits until odometry has passed its last beam.
+    known = np.minimum(times_ns, steps.stamps_ns[-1])
+    return between(odometry.odom_from_base, interpolate(steps.stamps_ns, steps.odom_from_base, known))
 
 
 def _slice(cloud: PointCloud2, base_from_lidar: Array, config: ClusterConfig, limits: Limits) -> Beams:

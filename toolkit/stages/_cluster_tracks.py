@@ -1,6 +1,5 @@
 """Ids that objects keep from scan to scan."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,7 +47,6 @@ class Tracks:
             return {}
         away = places[:, None] - np.array([track.place_xy for track in self._tracks])
         cost = np.minimum((away**2).sum(axis=-1) / self._gate_m**2, 1.0)
-        rows: Sequence[int]
         rows, columns = linear_sum_assignment(cost)
         return {int(i): self._tracks[j] for i, j in zip(rows, columns, strict=True) if cost[i, j] < 1.0}
 
