@@ -28,6 +28,8 @@ Bools = NDArray[np.bool_]
 _MOST = 24
 # An object is matched if so much of a chi-square lies beyond it, a whole set if this much does.
 _OBJECT, _SET = 5e-4, 1e-4
+# Bundles matched at once, times the square of their objects: bounds the memory.
+_AT_ONCE = 20_000
 # Candidates closer than this are one place; so many places are kept.
 _SAME_M, _SAME_RAD = 0.5, 0.17
 _PLACES = 32
@@ -140,16 +142,22 @@ class Matcher:
         for size, members in by_size.items():
             if size < 2:
                 continue
-            sets = self.sets(
-                np.stack([read[i].points_xy for i in members]),
-                block_diagonal(np.stack([read[i].covariances for i in members])),
-                np.stack([read[i].probabilities for i in members]),
-                np.stack([read[i].spurious for i in members]),
-            )
-            fresh = np.ones((len(members), size), dtype=np.bool_)
-            for i, places in zip(members, self.places(sets, self.candidates(sets, fresh)), strict=True):
-                found[i] = places
+            step = max(_AT_ONCE // size**2, 1)
+            for first in range(0, len(members), step):
+                part = members[first : first + step]
+                for i, places in zip(part, self._places_of([read[i] for i in part]), strict=True):
+                    found[i] = places
         return [self._judge(*one) for one in zip(scenes, read, found, strict=True)]
+
+    def _places_of(self, read: Sequence[Objects]) -> list[Places | None]:
+        """Where each of several bundles of as many objects may have been seen."""
+        sets = self.sets(
+            np.stack([objects.points_xy for objects in read]),
+            block_diagonal(np.stack([objects.covariances for objects in read])),
+            np.stack([objects.probabilities for objects in read]),
+            np.stack([objects.spurious for objects in read]),
+        )
+        return self.places(sets, self.candidates(sets, np.ones(sets.points_xy.shape[:2], dtype=np.bool_)))
 
     def _judge(self, scene: SceneObjects, objects: Objects, places: Places | None) -> Match:
         if places is None or places.expected_accidental > self.config.accidental:

@@ -1,0 +1,89 @@
+"""UTIAS MRCLAM 6 (Leung et al. 2011) with its 15 landmark classes taken modulo 3: real robots, classes that repeat."""
+
+import dataclasses
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from tests.benchmark.rows import Row
+from toolkit.channels import POSE, SCENE_OBJECTS
+from toolkit.cli.main import run
+from toolkit.compare.read import read_reference
+from toolkit.compare.trajectory import Trajectory, interpolated
+from toolkit.geometry.se2 import Array
+from toolkit.landmarks.database import read_map, write_map
+from toolkit.messages.poses import PoseStamped
+from toolkit.messages.scene import SceneObjects
+from toolkit.recording.reader import open_recording
+from toolkit.runs.bundles import Reading, inputs_of, read_bundles
+from toolkit.runs.inputs import Choice
+from toolkit.stage import Bundle, Stamped
+from toolkit.stages.localize import STAGE, LocalizeConfig, process
+
+_MODULO = 3
+_GAP_NS = 10**9
+_MANY = 3
+
+
+def modulo_rows(data: Path) -> Iterator[Row]:
+    """Pooled over five robots against the surveyed map: how many positions are off, and how many bundles have one."""
+    with tempfile.TemporaryDirectory() as folder:
+        logs = Path(folder) / "d6"
+        _call("convert", data / "mrclam" / "MRCLAM_Dataset6.zip", "-o", logs)
+        database = Path(folder) / "map.db"
+        _call("map", logs / "robot1.mcap", "--from-reference", "--map", database)
+        surveyed = read_map(database)
+        write_map(database, dataclasses.replace(surveyed, classes=tuple(map(_renamed, surveyed.classes))))
+        counts = np.sum([_counts(log, database) for log in sorted(logs.glob("robot*.mcap"))], axis=0)
+    localized, wrong, large, large_localized = counts.tolist()
+    yield Row("mrclam6_modulo_3", wrong / localized, at_most=0.01, cases=localized)
+    yield Row("mrclam6_modulo_3_localized", large_localized / large, at_least=0.5, cases=large)
+
+
+def _call(*words: object) -> None:
+    try:
+        run([str(word) for word in words])
+    except SystemExit as stop:
+        if stop.code:
+            raise
+
+
+def _renamed(name: str) -> str:
+    return f"class {int(name.rsplit('_', 1)[1]) % _MODULO}"
+
+
+def _counts(log: Path, database: Path) -> tuple[int, int, int, int]:
+    """Bundles of one robot that are localized, wrong, of three objects or more, and localized among these."""
+    truth = read_reference(log)[0].trajectory
+    assert truth is not None
+    with open_recording(log) as recording:
+        inputs = inputs_of(recording, STAGE.reads, STAGE.reads, Choice())
+        raws = recording.messages(tuple(inputs))
+        bundles = [_modulo(bundle) for bundle in read_bundles(raws, inputs, STAGE.reads, Reading())]
+    many = {bundle.log_time_ns for bundle in bundles if len(_objects(bundle)) >= _MANY}
+    results = process(bundles, LocalizeConfig(), {"map": database})
+    poses = {stamped.log_time_ns: _pose(stamped) for stamped in results if stamped.channel == POSE}
+    times = np.array(sorted(poses), dtype=np.int64)
+    pairs = interpolated(Trajectory.of(times, np.array([poses[time] for time in times])), truth, _GAP_NS)
+    far = [np.linalg.norm(poses[int(times[i])][:2] - pose[:2]) > 1 for i, pose in zip(*pairs, strict=True)]
+    return len(far), int(sum(far)), len(many), len(many & set(poses))
+
+
+def _pose(stamped: Stamped) -> Array:
+    assert isinstance(stamped.message, PoseStamped)
+    return stamped.message.pose
+
+
+def _objects(bundle: Bundle) -> SceneObjects:
+    scene = bundle.get(SCENE_OBJECTS)
+    assert scene is not None
+    return scene
+
+
+def _modulo(bundle: Bundle) -> Bundle:
+    scene = _objects(bundle)
+    options = tuple(tuple((_renamed(name), score) for name, score in found) for found in scene.hypotheses)
+    renamed = dataclasses.replace(scene, hypotheses=options)
+    return dataclasses.replace(bundle, messages={**bundle.messages, SCENE_OBJECTS: renamed})
