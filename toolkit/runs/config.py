@@ -3,8 +3,10 @@
 import contextlib
 import dataclasses
 import difflib
+import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from toolkit.errors import ToolkitError, UsageError
 from toolkit.resources import detector
-from toolkit.sources import source_names
+from toolkit.sources import find_source, source_names
 from toolkit.stage import Stage
 from toolkit.stages import find_stage, stage_names
 
@@ -25,21 +27,36 @@ def gather(file: Path | None, settings: Sequence[str], method: str | None) -> Se
     `method` counts for every stage.
 
     Raises:
-        UsageError: the file or a setting cannot be read, or names a stage that does not exist.
+        UsageError: the file or a setting cannot be read, or names what does not exist, or a value does not fit.
     """
     gathered: Settings = _from_file(file) if file else {}
     for text in settings:
-        name, equals, value = text.partition("=")
-        stage, dot, key = name.partition(".")
-        if not (equals and dot and stage and key):
-            raise UsageError(f"--set {text}: write STAGE.KEY=VALUE, such as localize.max_sigma_m=0.3")
-        gathered.setdefault(stage, {})[key] = _value(value)
-    for stage in gathered:
-        _known(stage, (*stage_names(), *source_names()), "stage or source")
+        _merge(gathered, _from_text(text))
+    for name, table in gathered.items():
+        _known(name, (*stage_names(), *source_names()), "stage or source")
+        made = declaration(name)
+        stage_config(made.config, name, {key: value for key, value in table.items() if key not in made.files})
     if method is not None:
         for stage in stage_names():
             gathered.setdefault(stage, {}).setdefault("method", method)
     return gathered
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration:
+    """What can be configured of a stage or source: its dataclass, and the files that it takes."""
+
+    config: type[Any]
+    files: tuple[str, ...] = ()
+
+
+def declaration(name: str) -> Declaration:
+    """The declaration of a stage or source by name."""
+    if name in source_names():
+        return Declaration(find_source(name).config)
+    stage = find_stage(name)
+    files = (*stage.resources, *stage.options) if isinstance(stage, Stage) else ()
+    return Declaration(stage.config, files)
 
 
 def _from_file(path: Path) -> Settings:
@@ -55,11 +72,23 @@ def _from_file(path: Path) -> Settings:
     return tables
 
 
-def _value(text: str) -> Any:
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
+def _from_text(text: str) -> Settings:
+    """Settings of one text; a value that is no TOML is taken for a string."""
+    name, equals, value = text.partition("=")
+    for written in (value, json.dumps(value)):
+        with contextlib.suppress(tomllib.TOMLDecodeError):
+            tables = tomllib.loads(f"{name} = {written}")
+            if equals and all(isinstance(table, dict) for table in tables.values()):
+                return tables
+    raise UsageError(f"--set {text}: write STAGE.KEY=VALUE, such as localize.max_sigma_m=0.3")
+
+
+def _merge(into: dict[str, Any], other: Mapping[str, Any]) -> None:
+    for key, value in other.items():
+        if isinstance(value, dict) and isinstance(into.get(key), dict):
+            _merge(into[key], value)
+        else:
+            into[key] = value
 
 
 def stage_config(config: type[Any], stage: str, settings: Mapping[str, Any]) -> Any:
@@ -68,15 +97,27 @@ def stage_config(config: type[Any], stage: str, settings: Mapping[str, Any]) -> 
     Raises:
         UsageError: an unknown key (the nearest known one is named) or a value that does not fit.
     """
-    keys = [field.name for field in dataclasses.fields(config)]
     for key in settings:
-        _known(key, keys, f"setting of {stage}")
+        _known(key, [field.name for field in dataclasses.fields(config)], f"setting of {stage}")
     try:
-        return TypeAdapter(config).validate_python(dict(settings))
+        made = TypeAdapter(config).validate_python(dict(settings))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join([stage, *(str(part) for part in first["loc"])])
         raise UsageError(f"{where} = {first['input']!r}: {first['msg']}") from error
+    _all_taken(settings, effective(made), stage)
+    return made
+
+
+def _all_taken(given: Any, made: Any, where: str) -> None:
+    """Refuse what is given below the first level and is nowhere in what was made of it."""
+    if isinstance(given, Mapping) and isinstance(made, Mapping):
+        for key, value in given.items():
+            _known(key, made, f"setting of {where}")
+            _all_taken(value, made[key], f"{where}.{key}")
+    elif isinstance(given, list) and isinstance(made, list | tuple):
+        for i, (one, other) in enumerate(zip(given, made, strict=False)):
+            _all_taken(one, other, f"{where}.{i}")
 
 
 def effective(config: Any) -> dict[str, Any]:
@@ -91,7 +132,7 @@ def load_files(stage: Stage, settings: Settings, given: Mapping[str, Path | None
     Raises:
         UsageError: a file that the stage cannot do without is not given.
     """
-    own, kinds = dict(settings.get(stage.name, {})), (*stage.resources, *stage.options)
+    own, kinds = dict(settings.get(stage.name, {})), declaration(stage.name).files
     files = {name: Path(str(own.pop(name))) for name in kinds if name in own}
     files.update({name: path for name, path in given.items() if path is not None and name in kinds})
     for name in stage.resources:
