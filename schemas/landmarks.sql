@@ -60,3 +60,11 @@ CREATE TABLE manifest (
     name TEXT PRIMARY KEY,
     content TEXT NOT NULL
 ) STRICT, WITHOUT ROWID;
+
+-- What is kept of the search index of a large map: places of landmarks among the confirmed ones, 32-bit, little-endian.
+-- `landmarks` is a hash of what it depends on; where that does not fit, the index is built again.
+CREATE TABLE search_index (
+    name TEXT PRIMARY KEY CHECK (name IN ('triangles', 'pairs')),
+    landmarks TEXT NOT NULL,
+    content BLOB NOT NULL
+) STRICT;

@@ -1,6 +1,7 @@
 """The landmark database: one map in one SQLite file, whose bytes depend on the map alone."""
 
 import contextlib
+import hashlib
 import sqlite3
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -11,11 +12,15 @@ import numpy as np
 from toolkit.atomic import atomic_file
 from toolkit.errors import MapError
 from toolkit.landmarks.model import Group, LandmarkMap, Source
+from toolkit.landmarks.neighbours import Neighbours
 from toolkit.resources import resource
 
 APPLICATION_ID = 0x4D434C4D
 SCHEMA_VERSION = 1
 _UPPER = np.triu_indices(3)
+# Arrays of landmarks that are kept to load the index of a map with so many landmarks in less time.
+_KEPT = {"triangles": 3, "pairs": 2}
+_LARGE = 20_000
 
 
 def read_map(path: Path) -> LandmarkMap:
@@ -45,6 +50,22 @@ def read_manifest(path: Path) -> dict[str, str]:
         return {}
 
 
+def read_neighbours(path: Path, landmark_map: LandmarkMap) -> Neighbours | None:
+    """What is kept of the search index of a map that was read from a database.
+
+    None where nothing is (small maps are indexed in no time), or where the landmarks were changed since.
+    """
+    with _reading(path) as database:
+        try:
+            rows = database.execute("SELECT name, content FROM search_index WHERE landmarks = ?", (_key(landmark_map),))
+            found = {name: np.frombuffer(content, dtype="<i4").astype(np.int32) for name, content in rows}
+        except sqlite3.Error:
+            return None
+    if len(found) < len(_KEPT):
+        return None
+    return Neighbours(*(found[name].reshape(-1, size) for name, size in _KEPT.items()))
+
+
 def write_map(path: Path, landmark_map: LandmarkMap, manifest: Mapping[str, str] | None = None) -> None:
     """Write a map to a new database, or over the old one once it is whole. Same map, same bytes.
 
@@ -56,6 +77,8 @@ def write_map(path: Path, landmark_map: LandmarkMap, manifest: Mapping[str, str]
     with contextlib.closing(sqlite3.connect(":memory:", isolation_level=None)) as database:
         database.executescript(f"BEGIN;\n{resource('schemas', 'landmarks.sql').read_text(encoding='utf-8')}")
         _write(database, landmark_map)
+        if len(landmark_map) >= _LARGE:
+            _keep(database, landmark_map)
         database.executemany("INSERT INTO manifest VALUES (?, ?)", sorted((manifest or {}).items()))
         database.execute("COMMIT")
         content = database.serialize()
@@ -171,3 +194,19 @@ def _write(database: sqlite3.Connection, landmark_map: LandmarkMap) -> None:
             for i, source in enumerate(landmark_map.sources)
         ),
     )
+
+
+def _keep(database: sqlite3.Connection, landmark_map: LandmarkMap) -> None:
+    """The part of the search index that takes longest to build."""
+    neighbours, key = Neighbours.of_map(landmark_map), _key(landmark_map)
+    for name in _KEPT:
+        content = getattr(neighbours, name).astype("<i4").tobytes()
+        database.execute("INSERT INTO search_index VALUES (?, ?, ?)", (name, key, content))
+
+
+def _key(landmark_map: LandmarkMap) -> str:
+    """What the index depends on: which landmarks are confirmed, where they are, and of which classes."""
+    content = hashlib.sha256("\0".join(landmark_map.classes).encode())
+    content.update(landmark_map.tentative.tobytes())
+    content.update(landmark_map.positions_xy.astype("<f8").tobytes())
+    return content.hexdigest()

@@ -2,21 +2,19 @@
 
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from toolkit.landmarks.model import LandmarkMap
+from toolkit.landmarks.neighbours import SMALL_MAP, Neighbours, confirmed
 from toolkit.landmarks.plausible import check_map
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Every landmark takes part in triangles with so many of its nearest; small maps index all of theirs.
-_NEAREST = 5
-_TRIANGLES = 200_000
 # Classes are one more coordinate of the trees, so far apart that no tolerance reaches over.
 _APART = 1e3
 _WIDEST = 400.0
@@ -108,33 +106,30 @@ class MapIndex:
     _by_length: _Doubles
 
     @classmethod
-    def build(cls, landmark_map: LandmarkMap) -> "MapIndex":
-        """Index of the confirmed landmarks.
+    def build(cls, landmark_map: LandmarkMap, neighbours: Neighbours | None = None) -> "MapIndex":
+        """Index of the confirmed landmarks, whose neighbours may be known already.
 
         Raises:
             MapError: the map is not fit to localize in, see `check_map`.
         """
         check_map(landmark_map)
-        rows = np.flatnonzero(~landmark_map.tentative)
+        rows, names, class_of = confirmed(landmark_map)
         positions = landmark_map.positions_xy[rows]
-        names, class_of = np.unique([landmark_map.classes[i] for i in rows], return_inverse=True)
         places = cKDTree(positions, balanced_tree=False)
-        near = _neighbours(places, positions)
-        triangles, sides, triples = _canonical(_triangles(near), positions, class_of)
-        pairs = _pairs(near, class_of)
+        near = neighbours or Neighbours.of(places, positions, class_of)
         return cls(
             landmark_map,
             rows,
-            tuple(names.tolist()),
+            names,
             class_of,
             positions,
             landmark_map.covariances[rows],
             _extent(places, positions),
             places,
-            triangles,
-            pairs,
-            _Triples.of(sides, triples),
-            _Doubles.of(side_lengths(positions[pairs])[:, 0], _number(class_of[pairs], len(names))),
+            near.triangles,
+            near.pairs,
+            _Triples.of(_sides(positions, near.triangles), _numbers(class_of, near.triangles)),
+            _Doubles.of(_sides(positions, near.pairs)[:, 0], _numbers(class_of, near.pairs)),
         )
 
     def __len__(self) -> int:
@@ -148,7 +143,7 @@ class MapIndex:
     @property
     def small(self) -> bool:
         """Whether the map is so small that looking for unlikely classes as well costs little."""
-        return len(self.triangles) <= _TRIANGLES
+        return len(self.triangles) <= SMALL_MAP
 
     def find_triangles(self, sides: Array, classes: Ints, tolerance: Array) -> Hits:
         """Triangles like counter-clockwise ones of such sides (Q, 3), 01, 12, 20, and classes (Q, 3).
@@ -217,63 +212,18 @@ def _extent(places: cKDTree, positions: Array) -> tuple[float, float]:
     return float(nearest.min(where=nearest > 0, initial=widest)), widest
 
 
-def _neighbours(places: cKDTree, positions: Array) -> Ints:
-    """The nearest landmarks (N, K) of each, nearest first."""
-    n = len(positions)
-    count = min(n - 1, max(_NEAREST, int(np.sqrt(2 * _TRIANGLES / n))))
-    near = np.asarray(places.query(positions, k=np.arange(1, count + 2), workers=2)[1], dtype=np.int64)
-    own = near == np.arange(n)[:, None]
-    own[~own.any(axis=1), -1] = True  # landmarks in one place can push a landmark off its own list
-    others: Ints = near[~own].reshape(n, count)
-    return others
+def _sides(positions: Array, members: NDArray[np.int32]) -> Array:
+    """Lengths (M, S) as `side_lengths` has them, of many groups of S landmarks (M, S)."""
+    x, y = (coordinate[np.ascontiguousarray(members.T)] for coordinate in positions.T.copy())
+    dx, dy = x - np.roll(x, -1, axis=0), y - np.roll(y, -1, axis=0)
+    lengths: Array = np.sqrt(dx * dx + dy * dy).T
+    return lengths
 
 
-def _pairs(near: Ints, class_of: Ints) -> NDArray[np.int32]:
-    """Each pair of neighbours once, lower class first."""
-    n, count = near.shape
-    a, b = np.repeat(np.arange(n), count), near.ravel()
-    keep = (a < b) | ~(near[b] == a[:, None]).any(axis=1)
-    pairs = np.stack([a[keep], b[keep]], axis=1)
-    swap = class_of[pairs[:, 0]] > class_of[pairs[:, 1]]
-    return np.where(swap[:, None], pairs[:, ::-1], pairs).astype(np.int32)
-
-
-def _triangles(near: Ints) -> NDArray[np.int32]:
-    """Corners (3, T): each landmark with any two of its neighbours; those found from several corners once."""
-    n, count = near.shape
-    near = near.astype(np.int32)
-    own = np.arange(n, dtype=np.int32)
-    # A neighbour of lower number that lists this landmark too has the triangle, if it lists the third one as well.
-    first = [(near[near[:, i]] == own[:, None]).any(axis=1) & (near[:, i] < own) for i in range(count)]
-    parts = []
-    for i, j in zip(*np.triu_indices(count, 1), strict=True):
-        b, c = near[:, i], near[:, j]
-        has = np.zeros(n, dtype=np.bool_)
-        for corner, third, rows in ((b, c, np.flatnonzero(first[i])), (c, b, np.flatnonzero(first[j]))):
-            has[rows] |= (near[corner[rows]] == third[rows, None]).any(axis=1)
-        parts.append(np.stack([own, b, c])[:, ~has])
-    return np.concatenate(parts, axis=1) if parts else np.zeros((3, 0), dtype=np.int32)
-
-
-def _canonical(corners: NDArray[np.int32], positions: Array, class_of: Ints) -> tuple[NDArray[np.int32], Array, Ints]:
-    """Triangles (T, 3) counter-clockwise, from the corner where the classes read lowest.
-
-    With their sides (T, 3), 01, 12, 20, and the number (T,) of their classes.
-    """
-    (ax, bx, cx), (ay, by, cy) = (coordinate[corners] for coordinate in positions.T.copy())
-    left = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax) >= 0
-    ab, bc, ca = (np.sqrt(x * x + y * y) for x, y in ((bx - ax, by - ay), (cx - bx, cy - by), (ax - cx, ay - cy)))
-    ab, ca = np.where(left, ab, ca), np.where(left, ca, ab)
-    a, b, c = corners[0], np.where(left, corners[1], corners[2]), np.where(left, corners[2], corners[1])
+def _numbers(class_of: Ints, members: NDArray[np.int32]) -> Ints:
+    """Numbers (M,) as `_number` has them, of many groups of landmarks (M, S)."""
     count = int(class_of.max()) + 1
-    p, q, r = class_of[a], class_of[b], class_of[c]
-    from_a, from_b, from_c = (p * count + q) * count + r, (q * count + r) * count + p, (r * count + p) * count + q
-    lowest = np.minimum(np.minimum(from_a, from_b), from_c)
-    at_a = from_a == lowest
-    at_b = (from_b == lowest) & ~at_a
-
-    def turned(*of: NDArray[Any]) -> NDArray[Any]:
-        rows = [np.where(at_a, of[i], np.where(at_b, of[i - 2], of[i - 1])) for i in range(3)]
-        return np.stack(rows, axis=1)
-
-    return turned(a, b, c), turned(ab, bc, ca), lowest
+    number = np.zeros(len(members), dtype=np.int64)
+    for place in members.T:
+        number = number * count + class_of[place]
+    return number

@@ -11,6 +11,7 @@ from toolkit.landmarks.index import MapIndex
 from toolkit.landmarks.joining import Joiner
 from toolkit.landmarks.matching import MatchConfig, Matcher
 from toolkit.landmarks.model import LandmarkMap
+from toolkit.landmarks.neighbours import Neighbours
 from toolkit.landmarks.verdicts import Match
 from toolkit.messages.match import Status
 from toolkit.messages.scene import SceneObjects
@@ -43,7 +44,7 @@ class Settings(Protocol):
 class JoinedLocator:
     """Localizes the scenes of one log in their order."""
 
-    def __init__(self, landmark_map: LandmarkMap, settings: Settings) -> None:
+    def __init__(self, landmark_map: LandmarkMap, neighbours: Neighbours | None, settings: Settings) -> None:
         self._settings = settings
         limits = MatchConfig(
             accidental=settings.accidental,
@@ -54,7 +55,7 @@ class JoinedLocator:
         noise = OdometryNoise(
             settings.odometry_position_m, settings.odometry_heading_rad, settings.odometry_turning_rad
         )
-        self._matcher = Matcher(MapIndex.build(landmark_map), limits)
+        self._matcher = Matcher(MapIndex.build(landmark_map, neighbours), limits)
         self._joiner = Joiner(self._matcher, noise, settings.join_m)
 
     def locate(self, scenes: Sequence[SceneObjects], odometry: Sequence[OdometryAt | None]) -> list[Match]:

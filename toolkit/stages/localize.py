@@ -19,7 +19,7 @@ from toolkit.channels import (
 )
 from toolkit.errors import MapError
 from toolkit.geometry.se2 import compose, inverse
-from toolkit.landmarks.database import read_map
+from toolkit.landmarks.database import read_map, read_neighbours
 from toolkit.landmarks.model import LandmarkMap
 from toolkit.landmarks.plausible import check_map
 from toolkit.landmarks.scene import scene_from_map
@@ -81,7 +81,7 @@ class LocalizeConfig:
 def process(bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Path]) -> Iterator[Stamped]:
     """Match and pose of every bundle, the map once before the first."""
     landmark_map = _usable_map(resources["map"])
-    locate, size = _method(landmark_map, config)
+    locate, size = _method(resources["map"], landmark_map, config)
     stream, first = iter(bundles), True
     while batch := list(islice(stream, size)):
         if first:
@@ -106,14 +106,15 @@ def _usable_map(path: Path) -> LandmarkMap:
     return landmark_map
 
 
-def _method(landmark_map: LandmarkMap, config: LocalizeConfig) -> tuple[Locate, int]:
+def _method(path: Path, landmark_map: LandmarkMap, config: LocalizeConfig) -> tuple[Locate, int]:
     """The way to localize that the configuration and the map's classes ask for, and how many bundles at once."""
     if config.method == "thesis":
         return lambda scenes, _odometry: locate_as_in_the_thesis(scenes, landmark_map, config), _BATCH
     if len(unique_classes(landmark_map)) == np.count_nonzero(~landmark_map.tentative):
         unique = UniqueLocator(landmark_map, config)
         return lambda scenes, _odometry: unique.locate(scenes), _BATCH
-    return JoinedLocator(landmark_map, config).locate, _FOLLOWED if config.join_m > 0 else _BATCH
+    joined = JoinedLocator(landmark_map, read_neighbours(path, landmark_map), config)
+    return joined.locate, _FOLLOWED if config.join_m > 0 else _BATCH
 
 
 def _messages(bundle: Bundle, match: Match, frame: str, config: LocalizeConfig) -> Iterator[Stamped]:
