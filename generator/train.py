@@ -44,13 +44,15 @@ Run = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of the training
 @app.command()
 def pictures(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the set; an unfinished one goes on.")],
-    scenes: Annotated[int, typer.Option(help="Worlds to render; each gives eight pictures (0.9 MB each).")] = 640,
+    scenes: Annotated[int, typer.Option(help="Worlds to render; each gives eight pictures (0.9 MB each).")] = 480,
+    empty: Annotated[int, typer.Option(help="Worlds of nothing but distractors beside them.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 1,
     workers: Annotated[int, typer.Option(help="Processes that render.")] = 2,
 ) -> None:
     """Render the pictures to train on."""
-    for done in make(folder, worlds.TRAINING, scenes, seed, workers):
-        typer.echo(f"{done} of {scenes} scenes", err=True)
+    recipes = [(worlds.TRAINING, scenes), (worlds.judged("empty", catalog.TRAIN_SEEDS), empty)]
+    for done in make(folder, recipes, seed, workers):
+        typer.echo(f"{done} of {scenes + empty} scenes", err=True)
 
 
 @app.command()

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -66,21 +66,33 @@ def render(one: Scene, exposed: bool) -> Iterator[Picture]:
             )
 
 
-def make(folder: Path, recipe: Recipe, scenes: int, seed: int, workers: int = 1) -> Iterator[int]:
-    """Render a set of pictures into a folder, shard by shard; yields how many scenes are there.
+def make(folder: Path, recipes: Sequence[tuple[Recipe, int]], seed: int, workers: int = 1) -> Iterator[int]:
+    """Render so many scenes of each recipe into a folder, shard by shard; yields how many scenes are there.
 
     Shards that are there already are kept: an interrupted call goes on where it was.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    shards = [range(first, min(first + SHARD_SCENES, scenes)) for first in range(0, scenes, SHARD_SCENES)]
-    jobs = [(folder / f"{number:04d}.npz", recipe, seed, indices) for number, indices in enumerate(shards)]
+    jobs = [
+        (
+            folder / f"{kind}{first // SHARD_SCENES:03d}.npz",
+            recipe,
+            seed,
+            range(first, min(first + SHARD_SCENES, scenes)),
+        )
+        for kind, (recipe, scenes) in enumerate(recipes)
+        for first in range(0, scenes, SHARD_SCENES)
+    ]
     done = sum(len(job[3]) for job in jobs if job[0].exists())
     yield done
     with get_context("spawn").Pool(workers) as pool:
         for rendered in pool.imap_unordered(_make_shard, [job for job in jobs if not job[0].exists()]):
             done += rendered
             yield done
-    about = {"seed": seed, "scenes": scenes, "sha256": _digest(sorted(folder.glob("*.np[yz]")))}
+    about = {
+        "seed": seed,
+        "scenes": [scenes for _, scenes in recipes],
+        "sha256": _digest(sorted(folder.glob("*.np[yz]"))),
+    }
     (folder / _INDEX).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
 
 

@@ -12,6 +12,8 @@ from generator.training.examples import CLASS_IDS, Examples, Phase
 from generator.training.pictures import PictureSet, make, render
 from generator.training.worlds import THESIS_CLASSES, TRAINING, judged, scene
 
+RECIPES = [(TRAINING, 1), (judged("empty", TRAIN_SEEDS), 1)]
+
 
 def test_a_scene_depends_on_its_index_only() -> None:
     first, again, other = scene(TRAINING, 3, 5), scene(TRAINING, 3, 5), scene(TRAINING, 3, 6)
@@ -53,14 +55,14 @@ def test_bearings_point_at_the_middle_of_whole_objects() -> None:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("pictures")
-    assert list(make(path, TRAINING, 2, seed=5)) == [0, 2]
+    assert list(make(path, RECIPES, seed=5)) == [0, 1, 2]
     return path
 
 
 def test_a_finished_set_is_kept_and_has_the_same_digest(folder: Path, tmp_path: Path) -> None:
     digest = PictureSet(folder).digest
-    assert list(make(folder, TRAINING, 2, seed=5)) == [2]
-    list(make(tmp_path / "again", TRAINING, 2, seed=5))
+    assert list(make(folder, RECIPES, seed=5)) == [2]
+    list(make(tmp_path / "again", RECIPES, seed=5, workers=2))
     assert PictureSet(folder).digest == PictureSet(tmp_path / "again").digest == digest
 
 
