@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from mcap.writer import Writer as McapWriter
 
+from tests.cli.logs import write
+from tests.runs.chain import raw_log, raw_messages
 from tests.sources.bags import write_mrclam, write_plain_db3, write_ros1, write_ros2
-from toolkit.channels import MAP, ODOMETRY, POSE, SCENE_OBJECTS, TRUTH_POSE
+from toolkit.channels import MAP, ODOMETRY, POSE, SCENE_OBJECTS, TF_STATIC, TRUTH_POSE
 from toolkit.cli.console import DONE, PARTIAL, UNUSABLE, run_command
 from toolkit.cli.main import build
 from toolkit.messages.poses import Odometry, PoseStamped
@@ -67,7 +69,7 @@ def test_channels_roles_and_verbs(tmp_path: Path, capsys: pytest.CaptureFixture[
         "truth": ["/ground_truth/pose"],
     }
     assert found["verbs"] == ["map", "localize", "evaluate"]
-    assert found["missing"] == {"detect": ["image"]}
+    assert found["missing"] == {"detect": ["image"], "cluster": ["scan"]}
 
 
 def test_what_is_missing_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -136,3 +138,30 @@ def test_what_is_no_log_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture
     out, err = capsys.readouterr()
     assert out == ""
     assert err == f"error: {tmp_path}/none: there is no such file or folder; check the path\n"
+
+
+def test_scene_objects_can_be_made(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = document(capsys, raw_log(tmp_path / "log.mcap"))
+    assert found["verbs"] == ["detect", "cluster", "map", "localize"]
+
+
+def test_a_good_log_has_no_findings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = raw_log(tmp_path / "log.mcap")
+    assert document(capsys, log, "--check")["findings"] == []
+    assert run(log, "--check") == DONE
+    assert "nothing was found that costs results" in capsys.readouterr().out
+
+
+def test_findings_are_told_with_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    content = [stamped for stamped in raw_messages() if stamped.channel not in {TF_STATIC, ODOMETRY}]
+    log = write(tmp_path / "log.mcap", content)
+    findings = document(capsys, log, "--check")["findings"]
+    assert [(finding["level"], finding["check"]) for finding in findings] == [
+        ("problem", "frames"),
+        ("warning", "frames"),
+        ("warning", "frames"),
+    ]
+    assert run(log, "--check") == DONE
+    said = capsys.readouterr().out
+    assert "problem: /camera/camera_info: no transforms lead from camera to base_scan; record /tf_static" in said
+    assert "warning: there is no odometry" in said

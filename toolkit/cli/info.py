@@ -1,12 +1,13 @@
 """Show what logs hold and which verbs can use them."""
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from toolkit.cli import options
-from toolkit.cli.console import PARTIAL, moment, say, say_json, table, warn
+from toolkit.cli.console import PARTIAL, moment, progress, say, say_json, table, warn
 
 if TYPE_CHECKING:
     from toolkit.runs.info import LogInfo
@@ -14,12 +15,15 @@ if TYPE_CHECKING:
 
 def command(
     paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Recordings (MCAP), bags or data sets.")],
+    check: Annotated[
+        bool, typer.Option("--check", help="Read everything, and tell what will go wrong and what to do about it.")
+    ] = False,
     json: options.Json = False,
 ) -> None:
     """Show channels, times and roles of each PATH, and which verbs can use it or what they lack."""
     from toolkit.runs.info import describe
 
-    logs = [log for path in paths for log in describe(path, {})]
+    logs = [log for path in paths for log in describe(path, {}, progress if check else None)]
     if json:
         documents = [_document(log) for log in logs]
         say_json("info", documents[0] if len(documents) == 1 else {"logs": documents})
@@ -56,6 +60,7 @@ def _document(log: "LogInfo") -> dict[str, object]:
         "verbs": list(log.verbs),
         "missing": log.missing,
         "losses": list(log.losses),
+        **({} if log.findings is None else {"findings": [dataclasses.asdict(finding) for finding in log.findings]}),
     }
 
 
@@ -83,3 +88,8 @@ def _print(log: "LogInfo", *, several: bool) -> None:
         say(f"ready for: {', '.join(log.verbs)}")
     for verb, roles in log.missing.items():
         say(f"{verb} lacks: {', '.join(roles)}")
+    for finding in log.findings or ():
+        about = f"{finding.topic}: " if finding.topic else ""
+        say(f"{finding.level}: {about}{finding.text}; {finding.remedy}")
+    if log.findings == ():
+        say("nothing was found that costs results")

@@ -2,14 +2,17 @@
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from toolkit.channels import MAP_POSE, MATCH, POSE, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
 from toolkit.recording.reader import Recording, open_recording
+from toolkit.runs.bench import Watch
+from toolkit.runs.checks import Finding, check
 from toolkit.runs.config import Settings
 from toolkit.runs.inputs import ROLES, topics_for
 from toolkit.runs.logs import McapLog, OpenLog, open_logs
+from toolkit.runs.survey import survey
 from toolkit.sources import Log
 
 TRUTH, RESULTS = "truth", "results"
@@ -17,13 +20,15 @@ _BY_TOPIC = {
     TRUTH: (TRUTH_POSE.topic, TRUTH_OBJECTS.topic, TRUTH_DETECTIONS.topic),
     RESULTS: (MATCH.topic, POSE.topic, MAP_POSE.topic),
 }
+_SOURCES = ("image", "camera_info", "scan")
 NEEDS: Mapping[str, tuple[str, ...]] = {
     "detect": ("image",),
+    "cluster": ("scan",),
     "map": ("scene_objects", "odometry"),
     "localize": ("scene_objects",),
     "evaluate": (RESULTS, TRUTH),
 }
-"""The roles that each verb cannot do without."""
+"""The roles that each verb cannot do without; scene objects can be made where there are `_SOURCES`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +56,11 @@ class LogInfo:
     verbs: tuple[str, ...]
     missing: Mapping[str, list[str]]
     losses: tuple[str, ...] = field(default=())
+    findings: tuple[Finding, ...] | None = None
 
 
-def describe(path: Path, settings: Settings) -> list[LogInfo]:
-    """The logs at a path: a recording, a bag or a data set.
+def describe(path: Path, settings: Settings, watch: Watch | None = None) -> list[LogInfo]:
+    """The logs at a path: a recording, a bag or a data set; with `watch` all of it is read, and checked.
 
     Raises:
         RecordingError: it cannot be read.
@@ -69,6 +75,10 @@ def describe(path: Path, settings: Settings) -> list[LogInfo]:
             else:
                 losses = [*log.losses, *(loss for part in log.parts for loss in part.losses)]
                 described.append(_describe(log, _profile(log), log.parts, losses))
+            if watch is not None:
+                with watch(f"check {log.name}", log.size_bytes) as progress:
+                    findings = check(survey(log, described[-1].roles, progress))
+                described[-1] = replace(described[-1], findings=tuple(findings))
         return described
 
 
@@ -91,7 +101,10 @@ def _describe(log: OpenLog, profile: str, parts: Sequence[Log | Recording], loss
         ChannelInfo(topic, kind, count, count / seconds if seconds > 0 and count > 1 else None, role_of.get(topic))
         for (topic, kind), count in sorted(counts.items())
     )
-    missing = {verb: [role for role in needs if not roles.get(role)] for verb, needs in NEEDS.items()}
+    makeable = {"scene_objects"} if all(roles.get(role) for role in _SOURCES) else set()
+    missing = {
+        verb: [role for role in needs if not roles.get(role) and role not in makeable] for verb, needs in NEEDS.items()
+    }
     return LogInfo(
         log.path,
         log.name,
