@@ -227,6 +227,22 @@ def test_results_alone_are_taken_as_they_are(here: Path) -> None:
     assert states(run) == {"localize": "ran"}
 
 
+def test_results_only_are_those_of_the_run(here: Path) -> None:
+    run_stages(asked(here), here / "a.mcap", FRONT, "run")
+    run_stages(asked(here, "a.mcap", results_only=True), here / "b.mcap", ["localize"], "run")
+    assert set(topics(here / "b.mcap")) & {DETECTIONS.topic, SCENE_OBJECTS.topic} == set()
+    assert topics(here / "b.mcap")[MATCH.topic] == COUNT
+    run_stages(asked(here, "a.mcap", results_only=True), here / "c.mcap", ["localize"], "localize", lacking=True)
+    assert topics(here / "c.mcap")[SCENE_OBJECTS.topic] == COUNT
+
+
+def test_where_nothing_may_be_written_the_error_says_so(here: Path) -> None:
+    (here / ".out.mcap.parts").write_text("in the way")
+    with pytest.raises(RecordingError, match="cannot be made"):
+        run_stages(asked(here), here / "out.mcap", ["detect"], "run")
+    assert (here / ".out.mcap.parts").read_text() == "in the way"
+
+
 def test_our_transforms_stand_beside_the_logs_own(here: Path) -> None:
     other = Stamped(TF, 1, TFMessage((Transform.planar(1, ("base_footprint", "wheel"), (0, 0, 0)),)))
     with create_recording(here / "log.mcap") as writer:

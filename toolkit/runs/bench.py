@@ -2,7 +2,7 @@
 
 import contextlib
 import shutil
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -52,6 +52,21 @@ def parts_folder(output: Path) -> Iterator[Path]:
     shutil.rmtree(folder, ignore_errors=True)
 
 
+def part_file(folder: Path, record: StageRecord) -> Path:
+    """The file for the results of a record, in a folder that is there then.
+
+    Raises:
+        RecordingError: the folder cannot be made.
+    """
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise RecordingError(
+            f"{folder}: cannot be made ({error.strerror}); choose another place to write to"
+        ) from error
+    return folder / record.file_name
+
+
 @contextlib.contextmanager
 def open_bench(request: Request, parts: Path, output: Path | None) -> Iterator["Bench"]:
     """A bench for one log, with the results that lie in the log, in an earlier `output` and among the `parts`.
@@ -70,6 +85,7 @@ class Bench:
     def __init__(self, stack: ExitStack, request: Request, log: Log, parts: Path, output: Path | None) -> None:
         self.request, self.log = request, log
         self.results = dict(log.results)
+        self.of_this_run: set[str] = set()
         self._stack, self._parts = stack, parts
         self.earlier: Recording | None = None
         self._stores: list[tuple[str, dict[str, Layer]]] = [("the log", log.results)]
@@ -90,7 +106,7 @@ class Bench:
         if found is not None:
             return found
         reason, (stage, span) = self._why(step.record), (step.stage, self.request.span)
-        view, target = self.view(step.record), self.part(step.record)
+        view, target = self.view(step.record), part_file(self._parts, step.record)
         with watch(f"{stage.name} {self.log.path.name}", size_bytes(step, view, span)) as progress:
             record = run_step(step, view, span, self.request.thinning, target, progress)
         self.take(target)
@@ -103,25 +119,23 @@ class Bench:
         for place, layers in [*unfinished, *self._stores]:
             layer = layers.get(record.stage)
             if layer is not None and layer.record is not None and layer.record.key == record.key:
-                self.results[record.stage] = layer
+                self._show({record.stage: layer})
                 return StageRun(record.stage, "reused", f"the same results are in {place}", layer.record.outcome)
         return None
 
-    def part(self, record: StageRecord) -> Path:
-        """The file for the results of a record, in a folder that exists."""
-        self._parts.mkdir(exist_ok=True)
-        return self._parts / record.file_name
-
     def take(self, part: Path) -> None:
         """Show the results in a part to the next stages."""
-        self.results.update(result_layers(self._open(part)))
+        self._show(result_layers(self._open(part)))
 
     def kept_results(self) -> tuple[list[Layer], list[str]]:
         """The results for an output, by stage, and the stages whose results are left out.
 
-        These are such as were made from results that are not the ones for the output.
+        These are such as were made from results that are not the ones for the output. Where only results are asked for,
+        those of the run's own stages are meant.
         """
         kept, stale = dict(sorted(self.results.items())), list[str]()
+        if self.request.results_only:
+            kept = {name: layer for name, layer in kept.items() if name in self.of_this_run}
         while True:
             keys = {name: layer.record.key for name, layer in kept.items() if layer.record is not None}
             wrong = [
@@ -140,6 +154,10 @@ class Bench:
         """The log's own messages, without those on topics that results are on; transforms stand beside each other."""
         own, gone = self.log.own, {*topics} - {TF.topic}
         return replace(own, channels=tuple(entry for entry in own.channels if entry.connection.topic not in gone))
+
+    def _show(self, layers: Mapping[str, Layer]) -> None:
+        self.results.update(layers)
+        self.of_this_run.update(layers)
 
     def _open(self, path: Path) -> Recording:
         return self._stack.enter_context(open_recording(path))

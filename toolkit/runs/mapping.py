@@ -19,7 +19,7 @@ from toolkit.messages.poses import Path as PathMessage
 from toolkit.messages.poses import PoseStamped
 from toolkit.recording.writer import create_recording
 from toolkit.runs.assembly import assemble
-from toolkit.runs.bench import Bench, StageRun, Watch, open_bench, parts_folder, unwatched
+from toolkit.runs.bench import Bench, StageRun, Watch, open_bench, part_file, parts_folder, unwatched
 from toolkit.runs.bundles import Reading, inputs_of, read_bundles
 from toolkit.runs.config import load
 from toolkit.runs.pipeline import check_output, told
@@ -74,8 +74,9 @@ class MapRun:
 
 @dataclass(frozen=True, slots=True)
 class _LogPlan:
-    """One log on its way: its steps up to the scene objects, and what the map will read of it."""
+    """One log on its way: its place among the logs, its steps up to the scene objects, what the map will read of it."""
 
+    place: str
     request: Request
     fingerprint: str
     steps: tuple[Step, ...]
@@ -93,8 +94,11 @@ def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
     for recording, output in task.outputs.items():
         check_output(recording, output)
     with parts_folder(task.database) as parts:
-        plans = [_plan_log(stage, config, request, task, parts) for request in task.requests]
-        inputs = {f"log {i + 1}": entry.record.key for i, entry in enumerate(plans)}
+        plans = [
+            _plan_log(f"log {number}", stage, config, request, task, parts)
+            for number, request in enumerate(task.requests, 1)
+        ]
+        inputs = {entry.place: entry.record.key for entry in plans}
         record = record_of(stage, config, task.files, inputs, {})
         run = None if task.requests[0].force else _found(task, plans, record, parts)
         if run is None:
@@ -111,17 +115,17 @@ def _reduction() -> Reduction:
     return stage
 
 
-def _plan_log(stage: Reduction, config: Any, request: Request, task: MapTask, parts: Path) -> _LogPlan:
+def _plan_log(place: str, stage: Reduction, config: Any, request: Request, task: MapTask, parts: Path) -> _LogPlan:
     with open_bench(request, parts, None) as bench:
         steps = tuple(plan(request, bench.log, missing_stages(stage, bench.log)))
         options = choice_options(request.span.choice, stage.reads)
         record = record_of(stage, config, task.files, inputs_of_stage(stage, bench.log, steps), options)
-        return _LogPlan(request, bench.log.recording.fingerprint(), steps, record)
+        return _LogPlan(place, request, bench.log.recording.fingerprint(), steps, record)
 
 
 def _share(entry: _LogPlan, record: StageRecord) -> StageRecord:
     """The record of one log's share in the map that another record is of."""
-    return dataclasses.replace(entry.record, inputs={**entry.record.inputs, "map": record.key})
+    return dataclasses.replace(entry.record, inputs={**entry.record.inputs, entry.place: record.key})
 
 
 def _found(task: MapTask, plans: Sequence[_LogPlan], record: StageRecord, parts: Path) -> MapRun | None:
@@ -215,8 +219,7 @@ def _collect(
 
 def _write_part(record: StageRecord, landmark_map: LandmarkMap, trajectory: Trajectory, parts: Path) -> None:
     """One log's results of the map as a recording of their own."""
-    parts.mkdir(exist_ok=True)
-    with create_recording(parts / record.file_name) as writer:
+    with create_recording(part_file(parts, record)) as writer:
         for stamped in _results(landmark_map, trajectory):
             writer.add(stamped, record.stage)
         writer.metadata[RUN] = Manifest("part", fingerprint=record.key, stages=(record,)).entries()
