@@ -1,6 +1,8 @@
 """UTIAS MRCLAM 6 (Leung et al. 2011) with its 15 landmark classes taken modulo 3: real robots, classes that repeat."""
 
+import contextlib
 import dataclasses
+import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -43,8 +45,10 @@ def modulo_rows(data: Path) -> Iterator[Row]:
 
 
 def _call(*words: object) -> None:
+    """Run the command line; what it says does not belong to the benchmark's own output."""
     try:
-        run([str(word) for word in words])
+        with contextlib.redirect_stdout(sys.stderr):
+            run([str(word) for word in words])
     except SystemExit as stop:
         if stop.code:
             raise

@@ -1,4 +1,11 @@
-"""Candidate poses of a bundle anywhere in the map, from its pairs and triangles of objects."""
+"""Candidate poses of a bundle anywhere in the map, from its pairs and triangles of objects.
+
+This and `verification` find what a maximum clique over pairwise consistency would: take the pairs (object, landmark) as
+nodes, joined where distances agree. A clique of three nodes or more holds a triangle of objects that is like one of the
+map, so it grows from one of the seeds made here. The verifier grows each under one pose, by the joint chi-square, which
+pairwise distances only approximate and which tells a clique from its mirror image. All triangles of up to six objects
+are seeds; of more, those of near objects, so that the work stays within bounds (24 objects at most) without a clock.
+"""
 
 from dataclasses import dataclass
 from itertools import combinations
