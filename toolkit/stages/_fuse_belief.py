@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass, field
 
+_REMEMBERED, _TOO_FAR_ASIDE = 5, 3.0
+
 
 @dataclass(frozen=True, slots=True)
 class Weighing:
@@ -23,19 +25,23 @@ class Weighing:
 
 @dataclass(slots=True)
 class Belief:
-    """One track's log odds by class; `other` is that of every class which no detection has named."""
+    """One track's log odds by class; `other` is that of every class which no detection has named.
+
+    `aside` is how far aside of their middles detections were on average lately, in sigmas, positive to the left.
+    """
 
     weighing: Weighing
     other: float = 0.0
     log_odds: dict[str, float] = field(default_factory=dict)
     radii_m: dict[str, float] = field(default_factory=dict)
     hits: int = 0
+    aside: float = 0.0
 
     def __post_init__(self) -> None:
         self.other = math.log(self.weighing.prior)
 
-    def hit(self, name: str, score: float) -> None:
-        """A detection of a class fell on the track."""
+    def hit(self, name: str, score: float, aside: float) -> None:
+        """A detection of a class fell on the track, so many sigmas aside of its middle."""
         weighing, sure = self.weighing, min(max(score, 0.05), 0.95)
         gain = math.log(weighing.gain * sure / (1 - sure))
         confused = gain + math.log(weighing.confusion)
@@ -44,7 +50,13 @@ class Belief:
         self.log_odds[name] += gain - confused
         self.other += confused
         self.hits += 1
+        self.aside += (aside - self.aside) / min(self.hits, _REMEMBERED)
         self._limit()
+
+    @property
+    def leans(self) -> bool:
+        """Whether the detections were always on the same side: they are of something beside the track."""
+        return abs(self.aside) * math.sqrt(min(self.hits, _REMEMBERED)) > _TOO_FAR_ASIDE
 
     def miss(self) -> None:
         """An image shows the track's place, and nothing there."""
@@ -58,11 +70,8 @@ class Belief:
             self.log_odds = {name: value - over for name, value in self.log_odds.items()}
             self.other -= over
 
-    def probabilities(self, fits: dict[str, float]) -> list[tuple[str, float]]:
-        """Classes that detections named with their probabilities, most probable first.
-
-        `fits` says how well the scan fits a class, as a factor on its odds, and on those of none under the name "".
-        """
-        odds = {name: math.exp(value) * fits.get(name, 1.0) for name, value in self.log_odds.items()}
-        whole = sum(odds.values()) + fits.get("", 1.0)
+    def probabilities(self) -> list[tuple[str, float]]:
+        """Classes that detections named with their probabilities, most probable first."""
+        odds = {name: math.exp(value) for name, value in self.log_odds.items()}
+        whole = sum(odds.values()) + 1.0
         return sorted(((name, value / whole) for name, value in odds.items()), key=lambda entry: (-entry[1], entry[0]))

@@ -13,13 +13,13 @@ from toolkit.stages._fuse_sizes import Size
 SURFACE = ""
 """The hypothesis of no known shape: the middle of the near surface."""
 
-_LEAST_FIT = 0.1
+_LEAST_FIT = 1e-3
 _RADIUS_ERROR = 0.3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Centres:
-    """Positions (N, 2), covariances (N, 2, 2) and fits (N,) of N objects under one class; 1 is the best fit."""
+    """Positions (N, 2), covariances (N, 2, 2) and fits (N,) of N objects under one class; a fit is at most 1."""
 
     positions_xy: Array
     covariances: Array
@@ -41,12 +41,15 @@ def centres_of(objects: ScanObjects, name: str, radii_m: Array) -> Centres:
 
 
 def fits_of(objects: ScanObjects, i: int) -> dict[str, float]:
-    """How well the scan fits each class's shapes, and none (""), beside the best; never less than a tenth."""
+    """How well the scan fits each class: the probability of its shapes where only they and the bare surface could be.
+
+    It is very small where hits of several things have run together.
+    """
     shares: dict[str, float] = {}
     for name, share in objects.hypotheses[i]:
         shares[name] = shares.get(name, 0.0) + share
-    best = max(shares.values(), default=1.0) or 1.0
-    return {name: max(share / best, _LEAST_FIT) for name, share in shares.items()}
+    bare = shares.pop(SURFACE, 0.0)
+    return {name: max(share / (share + bare), _LEAST_FIT) if share else _LEAST_FIT for name, share in shares.items()}
 
 
 def radii_in_boxes(objects: ScanObjects, view: View, sights: Sights, box: int, size: Size) -> Array:

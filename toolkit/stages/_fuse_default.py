@@ -19,7 +19,13 @@ from toolkit.stages._fuse_sizes import ANY_SIZE, Size
 _NEVER = 1e6
 _KEPT_BUNDLES = 100
 _LEAST_SHARE = 0.02
+_ALONE = 12.0
+"""What it costs a box to be of nothing in the scan, such as an object too far away or too thin for the LiDAR."""
 _LEAST_TOLD = 0.005
+_SMALLER = 0.8
+"""How much smaller than usual an object may be that is before another one."""
+_RESOLVED = 0.01
+"""A shape that fits a cluster worse has no centre that counts: hits of several things have run together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +39,17 @@ class Rules:
     size_gate: float
     least_probability: float
     least_height_px: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Candidates:
+    """M boxes as N objects: costs (M, N), very high where it cannot be; how far aside the object is (M, N), in sigmas;
+    radii_m (M, N) that it would have.
+    """
+
+    costs: Array
+    aside: Array
+    radii_m: Array
 
 
 @dataclass(slots=True)
@@ -65,41 +82,60 @@ class Fuser:
         sights = sights_of(view, detections.boxes_xyxy, self._rules.error)
         beliefs = [self._tracks[name].belief for name in objects.ids]
         named = [options[0] for options in detections.hypotheses]
-        costs, radii = self._costs(objects, beliefs, [name for name, _ in named], sights, view)
-        pairs = _assigned(costs)
+        names = [name for name, _ in named]
+        candidates = self._candidates(objects, beliefs, names, sights, view)
+        pairs = _assigned(candidates.costs)
         for box, i in pairs:
             name, score = named[box]
-            rivals = np.exp((costs[box, i] - costs[box]) / 2)
-            beliefs[i].hit(name, score / float(rivals.sum()))
+            rivals = np.exp((candidates.costs[box, i] - np.append(candidates.costs[box], _ALONE)) / 2)
+            beliefs[i].hit(name, score / float(rivals.sum()), float(candidates.aside[box, i]))
             if not (sights.cut[box, 0] or sights.cut[box, 2]):
-                before = beliefs[i].radii_m.get(name, radii[box, i])
-                beliefs[i].radii_m[name] = float(0.7 * before + 0.3 * radii[box, i])
+                before = beliefs[i].radii_m.get(name, candidates.radii_m[box, i])
+                beliefs[i].radii_m[name] = float(0.7 * before + 0.3 * candidates.radii_m[box, i])
         hit = {i for _, i in pairs}
+        nearness = self._nearness(objects, pairs, view, names, sights)
         for i, belief in enumerate(beliefs):
-            if belief.hits and i not in hit and self._is_missed(objects, i, belief, sights, view):
+            beside = belief.leans and belief.hits > 1
+            if belief.hits and (
+                beside or (i not in hit and self._is_missed(objects, i, belief, sights, nearness, view))
+            ):
                 belief.miss()
         return len(detections) - len(pairs)
 
-    def _costs(
+    def _candidates(
         self, objects: ScanObjects, beliefs: list[Belief], names: list[str], sights: Sights, view: View
-    ) -> tuple[Array, Array]:
-        """Costs (M, N) of taking boxes for objects, very high where it cannot be; radii (M, N) that they would have."""
-        rules = self._rules
-        costs, radii = np.full((len(names), len(objects)), _NEVER), np.zeros((len(names), len(objects)))
+    ) -> _Candidates:
+        """Every box as every object."""
+        rules, shape = self._rules, (len(names), len(objects))
+        found = _Candidates(np.full(shape, _NEVER), np.zeros(shape), np.zeros(shape))
         for box, name in enumerate(names):
             size = rules.sizes.get(name, ANY_SIZE)
-            radii[box] = radii_in_boxes(objects, view, sights, box, size)
-            found = centres_of(objects, name, radii[box])
-            sideways, upright = misfits(view, sights, box, (found.positions_xy, found.covariances), size, rules.error)
+            found.radii_m[box] = radii_in_boxes(objects, view, sights, box, size)
+            centres = centres_of(objects, name, found.radii_m[box])
+            places = centres.positions_xy, centres.covariances
+            aside, upright = misfits(view, sights, box, places, size, rules.error)
             earned = np.array([max(_share(belief, name), _LEAST_SHARE) for belief in beliefs])
-            total = sideways + upright - 2 * np.log(found.fits) - 2 * np.log(earned)
-            possible = (sideways <= rules.bearing_gate) & (upright <= rules.size_gate)
-            costs[box] = np.where(possible, total, _NEVER)
-        return costs, radii
+            total = aside**2 + upright - 2 * np.log(centres.fits) - 2 * np.log(earned)
+            possible = (aside**2 <= rules.bearing_gate) & (upright <= rules.size_gate)
+            found.costs[box], found.aside[box] = np.where(possible, total, _NEVER), aside
+        return found
 
-    def _is_missed(self, objects: ScanObjects, i: int, belief: Belief, sights: Sights, view: View) -> bool:
+    def _nearness(
+        self, objects: ScanObjects, pairs: list[tuple[int, int]], view: View, names: list[str], sights: Sights
+    ) -> Array:
+        """How far from the camera what is in the boxes (M,) is; at least, where that goes by height only."""
+        sizes = [self._rules.sizes.get(name, ANY_SIZE) for name in names]
+        tall = np.array([max(size.tall_m[0], size.top_m[0] - size.foot_m[1]) for size in sizes])
+        nearness = _SMALLER * tall / np.maximum(sights.top - sights.bottom, 1e-3)
+        for box, i in pairs:
+            nearness[box] = np.hypot(*view.from_camera(objects.positions_xy[i][-1:])[0])
+        return nearness
+
+    def _is_missed(
+        self, objects: ScanObjects, i: int, belief: Belief, sights: Sights, nearness: Array, view: View
+    ) -> bool:
         """Whether the image would show an object, large enough, and has no box that it could be in or behind."""
-        name, _ = belief.probabilities({})[0]
+        name, _ = belief.probabilities()[0]
         size = self._rules.sizes.get(name, ANY_SIZE)
         middle_m = (size.foot_m[0] + size.top_m[0]) / 2
         point = self._centres(objects, name).positions_xy[i]
@@ -108,7 +144,8 @@ class Fuser:
         height_px = (size.top_m[0] - size.foot_m[1]) / max(distance, 0.1) * view.camera.intrinsics[1, 1]
         if height_px < self._rules.least_height_px or not view.shows(point, half_width, middle_m):
             return False
-        return not sights.covers(math.atan2(place[1], place[0]), half_width / distance)
+        before = nearness < distance
+        return not sights.covers(math.atan2(place[1], place[0]), half_width / distance, before)
 
     def _centres(self, objects: ScanObjects, name: str) -> Centres:
         default = self._rules.sizes.get(name, ANY_SIZE).radius_m
@@ -120,8 +157,11 @@ class Fuser:
         found = []
         for i, track in enumerate(objects.ids):
             belief = self._tracks[track].belief
-            options = belief.probabilities(fits_of(objects, i)) if belief.hits else []
-            if options and options[0][1] >= self._rules.least_probability:
+            fits = fits_of(objects, i)
+            options = belief.probabilities() if belief.hits else []
+            if not options or fits.get(options[0][0], 1.0) < _RESOLVED:
+                continue
+            if options[0][1] >= self._rules.least_probability:
                 told = tuple((name, share) for name, share in options if share >= _LEAST_TOLD)
                 found.append((options[0][1], i, told))
         kept: list[tuple[int, tuple[tuple[str, float], ...], Array, Array, float]] = []

@@ -15,7 +15,7 @@ from toolkit.stages._fuse_sizes import Size
 _EDGE_MARGIN_PX = 2.5
 _CLOCK_S = 0.01
 _DEPTH_M = 0.05
-_NARROWED, _HEIGHT_SPREAD = 0.35, 0.1
+_NARROWED, _HEIGHT_SPREAD = 0.35, 0.07
 _HIDDEN_FOOT_M = 0.25
 """An object's foot may be hidden by what stands before it, so high, give or take."""
 _OFF_MIDDLE = 0.2
@@ -88,10 +88,10 @@ class Sights:
     def __len__(self) -> int:
         return len(self.middle)
 
-    def covers(self, bearing_rad: float, margin_rad: float) -> bool:
-        """Whether any box reaches across a bearing, give or take a margin."""
+    def covers(self, bearing_rad: float, margin_rad: float, of: NDArray[np.bool_]) -> bool:
+        """Whether any of some boxes, by a mask (M,), reaches across a bearing, give or take a margin."""
         half = np.abs(wrap(self.left - self.right)) / 2 + margin_rad
-        return bool((np.abs(wrap(bearing_rad - self.middle)) <= half).any())
+        return bool((of & (np.abs(wrap(bearing_rad - self.middle)) <= half)).any())
 
 
 def sights_of(view: View, boxes_xyxy: Array, error: BoxError) -> Sights:
@@ -125,7 +125,7 @@ def misfits(
 ) -> tuple[Array, Array]:
     """How badly one box fits objects with centres (N, 2) and covariances (N, 2, 2), if they have a size.
 
-    Returns chi-squares (N,) of the bearing, with one degree of freedom, and of height and width.
+    Returns how far to the left of the box they are (N,), in sigmas, and chi-squares (N,) of height and width.
     """
     places = view.from_camera(centres[0])
     distance = np.maximum(np.hypot(places[:, 0], places[:, 1]), 0.05)
@@ -143,16 +143,17 @@ def _sideways(sights: Sights, box: int, bearing: Array, distance: Array, varianc
     off = wrap(bearing - sights.middle[box])
     half = abs(float(wrap(sights.left[box] - sights.right[box]))) / 2
     if left_cut and right_cut:
-        return np.where(np.abs(off) <= half, 0.0, off**2 / variance)
+        return np.where(np.abs(off) <= half, 0.0, off / np.sqrt(variance))
     if not (left_cut or right_cut):
         variance = variance + sights.sigma_rad[box] ** 2 / 2 + (_OFF_MIDDLE * half) ** 2
-        return np.asarray(off**2 / variance)
+        return np.asarray(off / np.sqrt(variance))
     # Its middle is half of the object's width from the free edge, and the object is at least as wide as what shows.
     narrow, wide = (np.arctan(width / 2 / distance) for width in size.width_m)
     from_edge = half + (off if left_cut else -off)
     nearest = np.maximum(narrow, half)
     beyond = from_edge - np.clip(from_edge, nearest, np.maximum(nearest, wide))
-    return np.asarray(beyond**2 / (variance + sights.sigma_rad[box] ** 2))
+    towards = 1.0 if left_cut else -1.0
+    return np.asarray(towards * beyond / np.sqrt(variance + sights.sigma_rad[box] ** 2))
 
 
 def _upright(sights: Sights, box: int, distance: Array, camera_m: float, size: Size) -> Array:
@@ -167,6 +168,9 @@ def _upright(sights: Sights, box: int, distance: Array, camera_m: float, size: S
         total = total + _over(size.top_m[0], top, unsure + _HEIGHT_SPREAD * size.top_m[0])
     if not bottom_cut:
         total = total + _over(size.foot_m[0], foot, unsure)
+    if not (top_cut or bottom_cut):
+        least, most = size.tall_m
+        total = total + _over(top - foot, most, 1.4 * unsure) + _over(least, top - foot, 1.4 * unsure + _HIDDEN_FOOT_M)
     total = total + _over(foot, size.foot_m[1], unsure + _HIDDEN_FOOT_M)
     if not (left_cut or right_cut):
         total = total + _over(size.width_m[0], width, blurred + _NARROWED * size.width_m[0])

@@ -54,8 +54,8 @@ class FuseConfig:
     min_probability: Share = 0.5
     min_objects: Annotated[int, Field(ge=1)] = 2
     sizes: dict[str, Size] = field(default_factory=dict)
-    bearing_gate: Positive = 9.0
-    size_gate: Positive = 9.0
+    bearing_gate: Positive = 7.0
+    size_gate: Positive = 4.0
     edge_px: Positive = 2.0
     edge_share: Share = 0.04
     bearing_sigma_deg: Positive = 0.3
