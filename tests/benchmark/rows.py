@@ -52,14 +52,18 @@ class Row:
         }
 
 
-def main(measure: Callable[[bool], Iterable[Row]], description: str) -> int:
-    """Run `measure(quick)` as the command line asks and print its rows; 1 if one of them misses its goal."""
-    parser = argparse.ArgumentParser(description=description)
+def main(measure: Callable[..., Iterable[Row]], description: str, *options: argparse.ArgumentParser) -> int:
+    """Run `measure(quick)` as the command line asks and print its rows; 1 if one of them misses its goal.
+
+    `options` are parsers without help of options that `measure` takes by name.
+    """
+    parser = argparse.ArgumentParser(description=description, parents=options)
     parser.add_argument("--json", action="store_true", help="print a list of rows instead of a table")
     parser.add_argument("--quick", action="store_true", help="fewer cases, within ten minutes")
-    arguments = parser.parse_args()
-    rows = list(measure(arguments.quick))
-    if arguments.json:
+    arguments = vars(parser.parse_args())
+    as_json = arguments.pop("json")
+    rows = list(measure(**arguments))
+    if as_json:
         print(json.dumps([row.as_json() for row in rows], indent=2))
     else:
         Console(width=180).print(_table(rows))
