@@ -16,7 +16,8 @@ from toolkit.geometry.angles import yaw_from_quaternion
 from toolkit.geometry.se2 import Array
 from toolkit.landmarks.sightings import usable
 from toolkit.messages.codec import decode
-from toolkit.messages.columns import Table, layout_of
+from toolkit.messages.columns import Table
+from toolkit.messages.layout import layout_of
 from toolkit.messages.match import LandmarkMatch, Status
 from toolkit.messages.parts import PLANAR
 from toolkit.messages.poses import PoseStamped, PoseWithCovarianceStamped

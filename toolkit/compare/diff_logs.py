@@ -14,7 +14,8 @@ from toolkit.compare.diff_pairs import pair_keys
 from toolkit.compare.diff_values import Rows
 from toolkit.compare.diff_view import Fields, View, unit_of, view
 from toolkit.errors import MessageError
-from toolkit.messages.columns import Column, Kind, Layout, layout_of
+from toolkit.messages.columns import Column, Kind
+from toolkit.messages.layout import Layout, layout_of
 from toolkit.messages.typestore import definition, typestore
 from toolkit.recording.blocks import Progress
 from toolkit.recording.reader import Recording
