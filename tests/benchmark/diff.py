@@ -57,7 +57,7 @@ def messages(bundles: int, moved_m: float, lost: int) -> Iterator[Stamped]:
         match = LandmarkMatch(time_ns, "base_footprint", status, ids, matched, residual, ("a",), np.ones(1))
         yield Stamped(channels.MATCH, time_ns, match)
         if status is Status.LOCALIZED:
-            there = pose + [moved_m, 0, moved_m / 10]
+            there = pose + np.array([moved_m, 0, moved_m / 10])
             covariance = np.diag([0.01, 0.01, 0.001]) + moved_m / 100
             yield Stamped(channels.POSE, time_ns, PoseStamped.planar(time_ns, "map", there))
             estimate = PoseWithCovarianceStamped.planar(time_ns, "map", there, covariance)

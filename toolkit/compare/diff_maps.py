@@ -113,7 +113,7 @@ def _landmarks(side: LandmarkMap) -> Batch:
         "covariance": _numbers(side.covariances.reshape(-1, 4)),
         "radius_m": _numbers(side.radii_m[:, None]),
         "sightings": _numbers(side.sightings[:, None]),
-        "tentative": _numbers(side.tentative[:, None]),
+        "tentative": _numbers(side.tentative[:, None].astype(np.uint8)),
     }
     return Batch(Fields(columns), classes, None)
 
