@@ -26,10 +26,17 @@ class Centres:
     fits: Array
 
 
-def centres_of(objects: ScanObjects, name: str, radii_m: Array) -> Centres:
-    """Centres by the class's own most probable shape; without one, of discs of radii (N,) behind the surface."""
+def centres_of(objects: ScanObjects, name: str, radii_m: Array, *, has_shape: bool) -> Centres:
+    """Centres by the class's own most probable shape; without one, of discs of radii (N,) behind the surface.
+
+    A cluster without a hypothesis of a class that has shapes fits none of them.
+    """
     count = len(objects)
-    positions, covariances, fits = np.zeros((count, 2)), np.zeros((count, 2, 2)), np.ones(count)
+    positions, covariances, fits = (
+        np.zeros((count, 2)),
+        np.zeros((count, 2, 2)),
+        np.full(count, _LEAST_FIT if has_shape else 1.0),
+    )
     for i, options in enumerate(objects.hypotheses):
         row = next((k for k, (known, _) in enumerate(options) if known == name), None)
         if row is None:

@@ -65,10 +65,12 @@ class Fuser:
         self._rules = rules
         self._tracks: dict[str, _Track] = {}
         self._bundle = 0
+        self._shaped: set[str] = set()  # classes that the scans' shapes are of
 
     def add(self, objects: ScanObjects, detections: Detections | None, view: View | None) -> tuple[SceneObjects, int]:
         """The scene at a scan, with what an image beside it shows; also the number of boxes that nothing explains."""
         self._bundle += 1
+        self._shaped.update(name for options in objects.hypotheses for name, _ in options)
         for name in objects.ids:
             track = self._tracks.setdefault(name, _Track(Belief(self._rules.weighing), 0))
             track.seen = self._bundle
@@ -111,7 +113,7 @@ class Fuser:
         for box, name in enumerate(names):
             size = rules.sizes.get(name, ANY_SIZE)
             found.radii_m[box] = radii_in_boxes(objects, view, sights, box, size)
-            centres = centres_of(objects, name, found.radii_m[box])
+            centres = centres_of(objects, name, found.radii_m[box], has_shape=name in self._shaped)
             places = centres.positions_xy, centres.covariances
             aside, upright = misfits(view, sights, box, places, size, rules.error)
             earned = np.array([max(_share(belief, name), _LEAST_SHARE) for belief in beliefs])
@@ -150,18 +152,15 @@ class Fuser:
     def _centres(self, objects: ScanObjects, name: str) -> Centres:
         default = self._rules.sizes.get(name, ANY_SIZE).radius_m
         radii = [self._tracks[track].belief.radii_m.get(name, default) for track in objects.ids]
-        return centres_of(objects, name, np.array(radii, dtype=np.float64))
+        return centres_of(objects, name, np.array(radii, dtype=np.float64), has_shape=name in self._shaped)
 
     def _scene(self, objects: ScanObjects) -> SceneObjects:
         """Objects whose class is known well enough; of several of one class in one place the surest."""
         found = []
         for i, track in enumerate(objects.ids):
             belief = self._tracks[track].belief
-            fits = fits_of(objects, i)
             options = belief.probabilities() if belief.hits else []
-            if not options or fits.get(options[0][0], 1.0) < _RESOLVED:
-                continue
-            if options[0][1] >= self._rules.least_probability:
+            if options and self._is_clear(objects, i, *options[0]):
                 told = tuple((name, share) for name, share in options if share >= _LEAST_TOLD)
                 found.append((options[0][1], i, told))
         kept: list[tuple[int, tuple[tuple[str, float], ...], Array, Array, float]] = []
@@ -182,6 +181,11 @@ class Fuser:
             np.array([covariance for *_, covariance, _ in kept]).reshape(-1, 2, 2),
             np.array([radius for *_, radius in kept], dtype=np.float64),
         )
+
+    def _is_clear(self, objects: ScanObjects, i: int, name: str, probability: float) -> bool:
+        """Whether an object's class is sure enough, and the scan shows where its centre is."""
+        fit = fits_of(objects, i).get(name, 0.0 if name in self._shaped else 1.0)
+        return probability >= self._rules.least_probability and fit >= _RESOLVED
 
     def _radius(self, track: str, name: str) -> float:
         size = self._rules.sizes.get(name)
