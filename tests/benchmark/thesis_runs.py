@@ -92,14 +92,14 @@ def record(folder: Path, name: str, seed: int, model: list[str]) -> tuple[Path, 
     call("detect", raw, "-o", seen, *model)
     stops = stops_of(seen)
     perfect, with_drift = folder / f"{name}.mcap", folder / f"{name}_drift.mcap"
-    _cut(seen, seen, stops, perfect)
-    _cut(seen, drifting, stops, with_drift)
+    cut(seen, seen, stops, perfect)
+    cut(seen, drifting, stops, with_drift)
     for path in (raw, drifting, seen):
         path.unlink()
     return perfect, with_drift
 
 
-def _cut(log: Path, drive: Path, stops: Stops, target: Path) -> None:
+def cut(log: Path, drive: Path, stops: Stops, target: Path) -> None:
     """Write a log with its scans at the stops only, and with the odometry of a drive."""
     odometry = {ODOMETRY.topic, TF.topic}
     with open_recording(log) as recording, open_recording(drive) as driven, create_recording(target) as writer:

@@ -12,7 +12,7 @@ import numpy as np
 
 from generator.bundled import FOLDER
 from tests.benchmark.rows import Row
-from tests.benchmark.thesis_runs import Array, at_stops, call, stops_of
+from tests.benchmark.thesis_runs import Array, at_stops, call, cut, stops_of
 from toolkit.channels import SCAN_OBJECTS, SCENE_OBJECTS
 from toolkit.compare.pose_metrics import position_figures
 from toolkit.compare.read import read_reference
@@ -49,14 +49,17 @@ def study_rows(seed: int, quick: bool) -> Iterator[Row]:
 
 def _study(folder: Path, seed: int, beams: int) -> tuple[Errors, tuple[float, int]]:
     """Errors of centre and surface in metres by shape; RMSE of positions from one scan each, and how many there are."""
-    log, seen, labelled, result = (folder / f"{name}.mcap" for name in ("log", "seen", "labelled", "result"))
+    names = ("log", "standing", "seen", "labelled", "result")
+    log, standing, seen, labelled, result = (folder / f"{name}.mcap" for name in names)
     settings = [f"--set=lidar.beams={beams}", "--set=camera.when=never"]
     call("generate", _on_legs(folder), "-o", log, "--seed", seed, "--workers", 1, *settings)
-    call("cluster", log, "-o", seen)
+    stops = stops_of(log)
+    cut(log, log, stops, standing)
+    call("cluster", standing, "-o", seen)
     errors = _label(seen, labelled)
     call("map", labelled, "--from-reference", "--map", folder / "map.db")
     call("localize", labelled, "--map", folder / "map.db", "-o", result, "--set", "localize.join_m=0")
-    positions = at_stops(result, stops_of(log), aligned=False)
+    positions = at_stops(result, stops, aligned=False)
     found = np.isfinite(positions.one_scan[:, 0])
     off = np.column_stack([(positions.one_scan - positions.truth)[found], np.zeros(int(found.sum()))])
     rmse_m = position_figures(off)["rmse_m"]
