@@ -34,12 +34,14 @@ class Centres:
     covariances: Array
 
 
-def centres(window: Windows, shapes: Sequence[Shape], noise: Noise) -> Centres:
+def centres(
+    window: Windows, shapes: Sequence[Shape], noise: Noise, allowed: NDArray[np.bool_] | None = None
+) -> Centres:
     """The posteriors of the centre over position, turn and size, of each shape, all equally likely before.
 
     Position across the view, turn and size are integrated over a grid that is refined where the posterior lies; the
     position along the view follows from the hits in closed form. What explains a cluster far worse than another shape
-    does is not refined.
+    does is not refined. `allowed` (C, S) says which shapes come into question, if not all.
     """
     known, many = palette(shapes), (len(window), len(shapes))
     found = Centres(
@@ -47,7 +49,7 @@ def centres(window: Windows, shapes: Sequence[Shape], noise: Noise) -> Centres:
         np.repeat(window.anchors_xy[:, None], many[1], axis=1),
         np.broadcast_to(np.eye(2), (*many, 2, 2)).copy(),
     )
-    clusters, which = np.nonzero(_possible(window, known))
+    clusters, which = np.nonzero(_possible(window, known) & (True if allowed is None else allowed))
     is_round = known.turn_rad[which] == 0
     groups = [(clusters[rows], which[rows]) for rows in (is_round, ~is_round) if rows.any()]
     searches = [_Search(window, known, rows, noise, found) for rows in groups]

@@ -1,10 +1,10 @@
 """Segments to objects: which of them belong together, what each could be, and where its centre is then."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from toolkit.geometry.se2 import Array, rotation
 from toolkit.lidar.beams import Beams
@@ -16,8 +16,12 @@ from toolkit.lidar.windows import Cluster, windows
 
 _NONE = 0.1
 """How likely something is of no known shape, before anyone looks."""
-_PER_M2 = 0.05
-"""Objects per square metre where there are any: two side by side are less likely than one of two parts."""
+_OTHER = 0.1
+"""How likely something of a class is not of the class's shapes."""
+_CRACK_M = 0.35
+"""Segments that are no farther apart can be of one solid thing, whose hits between them were lost."""
+_LOG_PER_M2 = -3.0
+"""Logarithm of objects per square metre where there are any: two side by side are less likely than one of two parts."""
 _UNKNOWN_M = 0.5
 """Hits of something of no known shape lie anywhere within so many metres along the view."""
 
@@ -38,17 +42,25 @@ class Hypotheses:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Explained:
-    """A cluster under H hypotheses, the last one the bare surface: log_evidence (H,), positions (H, 2), (H, 2, 2)."""
+    """A cluster under H hypotheses, the last one the bare surface: log_evidence (H,), positions (H, 2), (H, 2, 2).
+
+    `total` is the logarithm of the evidence for one object here; of several segments, for one of known shape.
+    """
 
     log_evidence: Array
     positions_xy: Array
     covariances: Array
+    total: float
 
-    @property
-    def total(self) -> float:
-        """The logarithm of the evidence for an object of whatever kind here."""
-        top = float(self.log_evidence.max())
-        return top + float(np.log(np.exp(self.log_evidence - top).sum())) + float(np.log(_PER_M2))
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pair:
+    """Two clusters that could be one, the joint one, and which shapes (S,) could be of such two."""
+
+    first: Cluster
+    second: Cluster
+    both: Cluster
+    shapes: NDArray[np.bool_]
 
 
 def objects(
@@ -61,7 +73,7 @@ def objects(
     """
     kinds = [(name, shape) for name, options in shapes.items() for shape in options]
     explain = _Explainer(beams, kinds, _priors(shapes), noise)
-    clusters = _joined(beams, segments, explain, max((_bridge_m(shape) for _, shape in kinds), default=0.0))
+    clusters = _joined(beams, segments, explain)
     return [
         _ranked([name for name, _ in kinds], explained, beams, cluster)
         for cluster, explained in zip(clusters, explain(clusters), strict=True)
@@ -74,15 +86,18 @@ def _priors(shapes: Mapping[str, Sequence[Shape]]) -> Array:
     return np.array([*share, _NONE if classes else 1.0])
 
 
-def _bridge_m(shape: Shape) -> float:
-    """The widest gap that the shape's parts leave between them, 0 for a single part."""
+def _parts_m(shape: Shape) -> tuple[float, float]:
+    """The distance of neighbouring parts of the shape, at most, and the radius of the largest; 0 for a single part."""
     if shape.apart_m is not None:
-        return shape.apart_m[1] - 2 * shape.discs[0][2]
+        return shape.apart_m[1], shape.discs[0][2]
     parts = [(x, y, radius) for x, y, radius in shape.discs]
-    parts += [(x, y, min(length, width) / 2) for x, y, length, width in shape.boxes]
-    gaps = np.array([[np.hypot(a[0] - b[0], a[1] - b[1]) - a[2] - b[2] for b in parts] for a in parts])
-    np.fill_diagonal(gaps, np.inf)
-    return float(gaps.min(axis=1).max()) if len(parts) > 1 else 0.0
+    parts += [(x, y, np.hypot(length, width) / 2) for x, y, length, width in shape.boxes]
+    if len(parts) < 2:
+        return 0.0, 0.0
+    places = np.array([part[:2] for part in parts])
+    apart = np.hypot(*(places[:, None] - places).T)
+    np.fill_diagonal(apart, np.inf)
+    return float(apart.min(axis=1).max()), max(part[2] for part in parts)
 
 
 class _Explainer:
@@ -93,26 +108,65 @@ class _Explainer:
         self._shapes = list(dict.fromkeys(shape for _, shape in kinds))
         self._row = [self._shapes.index(shape) for _, shape in kinds]
         self._log_priors = np.log(priors)
+        self._across_m = np.array([2 * shape.reach_m for shape in self._shapes])
+        self._parts_m = np.array([_parts_m(shape) for shape in self._shapes]).reshape(-1, 2)
+        # Where a shape does not fit, its centre is still about there.
+        self._vague_m2 = np.array([(0.1 * shape.reach_m + 0.02) ** 2 for _, shape in kinds])
         self._known: dict[Cluster, _Explained] = {}
 
-    def __call__(self, clusters: Sequence[Cluster]) -> list[_Explained]:
-        new = [cluster for cluster in dict.fromkeys(clusters) if cluster not in self._known]
-        if new:
-            self._explain(new)
-        return [self._known[cluster] for cluster in clusters]
+    @property
+    def widest_m(self) -> float:
+        """The widest gap that any shape has between two segments."""
+        return float(self._across_m.max(initial=0.0))
 
-    def _explain(self, clusters: Sequence[Cluster]) -> None:
+    def bridging(self, gap_m: float, widths_m: tuple[float, float], is_one_view: bool) -> NDArray[np.bool_]:
+        """Which shapes (S,) can have two clusters of some widths so far apart, seen by one LiDAR or one each by two.
+
+        Separate parts of a shape have their distance, and a segment is no wider than one of them; pieces of one part
+        are near each other, or seen from different sides.
+        """
+        apart, part = self._parts_m.T
+        separate = (gap_m <= apart + part) & (gap_m >= apart - 2 * part) & (min(widths_m) <= 2 * part + _CRACK_M / 4)
+        pieces = (gap_m <= _CRACK_M or not is_one_view) & (self._across_m >= gap_m)
+        return np.asarray((apart > 0) & separate | pieces)
+
+    def __call__(self, clusters: Sequence[Cluster], pairs: Sequence[_Pair] = ()) -> list[_Explained]:
+        """Clusters, each with all shapes, or pairs with those that can be of two segments."""
+        asked = [*dict.fromkeys(clusters), *(pair.both for pair in pairs)]
+        new = [i for i, cluster in enumerate(asked) if cluster not in self._known]
+        if new:
+            allowed = np.ones((len(asked), len(self._shapes)), dtype=np.bool_)
+            for i, pair in enumerate(pairs, len(asked) - len(pairs)):
+                allowed[i] = pair.shapes
+            self._explain([asked[i] for i in new], allowed[new])
+        return [self._known[cluster] for cluster in (*clusters, *(pair.both for pair in pairs))]
+
+    def _explain(self, clusters: Sequence[Cluster], allowed: NDArray[np.bool_]) -> None:
         window = windows(self._beams, clusters)
-        found = centres(window, self._shapes, self._noise)
+        found = centres(window, self._shapes, self._noise, allowed)
         for i, cluster in enumerate(clusters):
             point, spread = _surface(self._beams, cluster, float(window.spacing_m[i]), self._noise)
-            hits = int(window.is_hit[i].sum())
-            nothing = np.log(window.spacing_m[i]) - (hits - 1) * np.log(_UNKNOWN_M)
+            nothing = np.log(window.spacing_m[i]) - (int(window.is_hit[i].sum()) - 1) * np.log(_UNKNOWN_M)
+            shaped = found.log_evidence[i, self._row] + np.log(1 - _OTHER)
+            other = np.where(np.isfinite(shaped), np.log(_OTHER) + nothing, -np.inf)
+            either = np.logaddexp(shaped, other)
+            vague = np.exp(other - np.where(np.isfinite(either), either, 0.0)) * self._vague_m2
+            evidence = np.append(either, nothing) + self._log_priors
             self._known[cluster] = _Explained(
-                np.append(found.log_evidence[i, self._row], nothing) + self._log_priors,
+                evidence,
                 np.vstack([found.positions_xy[i, self._row], point]),
-                np.concatenate([found.covariances[i, self._row], spread[None]]),
+                np.concatenate([found.covariances[i, self._row] + vague[:, None, None] * np.eye(2), spread[None]]),
+                _log_sum(evidence if len(cluster) == 1 else shaped + self._log_priors[:-1]) + _LOG_PER_M2,
             )
+
+
+def _log_sum(logarithms: Array) -> float:
+    top = float(logarithms.max(initial=-np.inf))
+    return top if np.isinf(top) else top + float(np.log(np.exp(logarithms - top).sum()))
+
+
+def _is_one_view(first: Cluster, second: Cluster) -> bool:
+    return bool({one.sweep for one in first} & {one.sweep for one in second})
 
 
 def _surface(beams: Beams, cluster: Cluster, spacing_m: float, noise: Noise) -> tuple[Array, Array]:
@@ -130,23 +184,44 @@ def _surface(beams: Beams, cluster: Cluster, spacing_m: float, noise: Noise) -> 
     return points.mean(axis=0) + frame @ np.array([depth.mean(), middle]), spread
 
 
-def _joined(
-    beams: Beams, segments: Sequence[Segment], explain: Callable[[Sequence[Cluster]], list[_Explained]], bridge_m: float
-) -> list[Cluster]:
+def _joined(beams: Beams, segments: Sequence[Segment], explain: _Explainer) -> list[Cluster]:
     """The clusters that explain the segments best, found by joining the pair that gains most again and again."""
     clusters: list[Cluster] = [(segment,) for segment in segments]
     points = {cluster: beams.points_xy[cluster[0].hits(beams)] for cluster in clusters}
     while True:
-        pairs = [pair for pair in combinations(clusters, 2) if _gap_m(points[pair[0]], points[pair[1]]) <= bridge_m]
-        both = [tuple(sorted((*a, *b), key=lambda one: (one.sweep, one.first))) for a, b in pairs]
-        alone = {cluster: explained.total for cluster, explained in zip(clusters, explain(clusters), strict=True)}
-        gains = [joint.total - alone[a] - alone[b] for joint, (a, b) in zip(explain(both), pairs, strict=True)]
+        pairs = _pairs(clusters, points, explain)
+        found = [one.total for one in explain(clusters, pairs)]
+        alone = dict(zip(clusters, found, strict=False))
+        gains = [
+            joint - alone[pair.first] - alone[pair.second]
+            for pair, joint in zip(pairs, found[len(clusters) :], strict=True)
+        ]
         best = int(np.argmax(gains)) if gains else -1
         if best < 0 or gains[best] <= 0:
             return clusters
-        a, b = pairs[best]
-        points[both[best]] = np.concatenate([points[a], points[b]])
-        clusters = [both[best] if cluster == a else cluster for cluster in clusters if cluster != b]
+        pair = pairs[best]
+        points[pair.both] = np.concatenate([points[pair.first], points[pair.second]])
+        clusters = [pair.both if cluster == pair.first else cluster for cluster in clusters if cluster != pair.second]
+
+
+def _pairs(clusters: Sequence[Cluster], points: Mapping[Cluster, Array], explain: _Explainer) -> list[_Pair]:
+    """The clusters that are near enough to each other to be one object."""
+    if len(clusters) < 2:
+        return []
+    middles = np.array([points[cluster].mean(axis=0) for cluster in clusters])
+    radii = [
+        float(np.hypot(*(points[cluster] - middle).T).max()) for cluster, middle in zip(clusters, middles, strict=True)
+    ]
+    apart = np.hypot(*(middles[:, None] - middles).T) - np.add.outer(radii, radii)
+    found = []
+    for i, j in zip(*np.nonzero(np.triu(apart <= explain.widest_m, k=1)), strict=True):
+        first, second = clusters[i], clusters[j]
+        gap_m = _gap_m(points[first], points[second])
+        shapes = explain.bridging(gap_m, (2 * radii[i], 2 * radii[j]), _is_one_view(first, second))
+        if shapes.any():
+            both = tuple(sorted((*first, *second), key=lambda one: (one.sweep, one.first)))
+            found.append(_Pair(first, second, both, shapes))
+    return found
 
 
 def _gap_m(first: Array, second: Array) -> float:

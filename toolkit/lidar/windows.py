@@ -120,7 +120,7 @@ def _beams_of(beams: Beams, cluster: Cluster) -> tuple[NDArray[np.int64], NDArra
         own = [segment for segment in cluster if segment.sweep == sweep]
         start, count = beams.starts[sweep], beams.starts[sweep + 1] - beams.starts[sweep]
         first, last = _span(own, count)
-        inner = _thinned(np.arange(first, last + 1))
+        inner = _inner(own, first, last, count)
         room = (count - (last - first + 1)) // 2 if beams.is_closed[sweep] else count
         spacing = beams.spacing_rad[sweep] * float(beams.ranges_m[start + first % count])
         steps = _beside(spacing, room)
@@ -151,6 +151,15 @@ def _span(segments: Sequence[Segment], count: int) -> tuple[int, int]:
     begin = (int(np.argmax(gaps)) + 1) % len(firsts)
     first = firsts[begin][0]
     return first, max(first + (other - first) % count + length for other, length in firsts)
+
+
+def _inner(segments: Sequence[Segment], first: int, last: int, count: int) -> NDArray[np.int64]:
+    """The beams from the first to the last of some segments, in each of them and between them thinned alike, so that
+    segments look the same alone and together."""
+    cuts = sorted({first, *((segment.first - first) % count + first for segment in segments)})
+    cuts = sorted({*cuts, *((segment.last + 1 - first) % count + first for segment in segments)} - {first + count})
+    runs = np.split(np.arange(first, last + 1), [cut - first for cut in cuts if first < cut <= last])
+    return np.concatenate([_thinned(run) for run in runs])
 
 
 def _thinned(places: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -75,7 +75,7 @@ class Parts:
 AnyShape = Annotated[Disc | Legs | Box | Parts, Discriminator("kind")]
 Shapes = dict[str, tuple[AnyShape, ...]]
 
-_BICYCLE = tuple((x * 0.52 + y * 0.262, 0.0, 0.06, 0.044) for x in (1, -1) for y in (1, -1))
+_BICYCLE = tuple((x * 0.52 + y * 0.24, 0.0, 0.06, 0.044) for x in (1, -1) for y in (1, -1))
 _BENCH = ((0.0, 0.58, 0.38, 0.07), (0.0, -0.58, 0.38, 0.07))
 _BACKPACK = ((-0.045, 0.0, 0.19, 0.33), (0.055, 0.0, 0.10, 0.29), (0.11, 0.0, 0.06, 0.24), (-0.04, 0.0, 0.11, 0.40))
 _CHAIR = tuple((x * 0.19, y * 0.19, 0.022) for x in (1, -1) for y in (1, -1))
