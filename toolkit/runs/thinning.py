@@ -75,8 +75,8 @@ def thin(
 ) -> Iterator[RawMessage]:
     """The messages without the images that nobody wants, which are counted in `dropped`; nothing else is left out.
 
-    The rate is kept on the mean, by log time: images are taken as soon as they are due on a grid of that rate. Motion
-    is that of the latest odometry before an image; as long as there is none, every image is taken.
+    The rate is kept on the mean, by log time, and jitter costs no images. Motion is that of the latest odometry before
+    an image; as long as there is none, every image is taken.
     """
     rate = _Rate(thinning.rate_hz) if thinning.rate_hz else None
     motion = _Motion(thinning) if thinning.by_motion else None
@@ -98,19 +98,23 @@ def thin(
 
 
 class _Rate:
-    """When the next image is due."""
+    """A grid of moments from the first image on; each takes the first image that is nearest to it of them all."""
 
     def __init__(self, rate_hz: float) -> None:
         self._period_ns = round(1e9 / rate_hz)
-        self._due_ns: int | None = None
+        self._start_ns: int | None = None
+        self._taken = -1
 
     def is_due(self, time_ns: int) -> bool:
-        return self._due_ns is None or time_ns >= self._due_ns
+        return self._nearest(time_ns) > self._taken
 
     def take(self, time_ns: int) -> None:
-        due_ns = time_ns if self._due_ns is None else self._due_ns
-        missed = (time_ns - due_ns) // self._period_ns
-        self._due_ns = due_ns + (missed + 1) * self._period_ns
+        self._taken = self._nearest(time_ns)
+
+    def _nearest(self, time_ns: int) -> int:
+        if self._start_ns is None:
+            self._start_ns = time_ns
+        return (2 * (time_ns - self._start_ns) + self._period_ns - 1) // (2 * self._period_ns)
 
 
 class _Motion:
