@@ -8,11 +8,11 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import PARTIAL, moment, progress, say, say_json, table, warn
-from toolkit.cli.stage_runs import Configured, Given, finish, run_over
+from toolkit.cli.stage_runs import Given, finish, run_over
 from toolkit.errors import UsageError
 
 if TYPE_CHECKING:
-    from toolkit.runs.bundles import Reading, Span
+    from toolkit.runs.bundles import Reading
     from toolkit.runs.moment import Answer
     from toolkit.runs.pipeline import LogRun
 
@@ -49,15 +49,15 @@ def command(
     span = options.span(start, end, remap, {"odometry": odom, "scan": scan, "image": image})
     configured = config_file, settings, method
     asked_ns = options.time_ns(at, "--at")
+    files = {"map": map_file, "model": model, "extrinsics": extrinsics}
+    given = Given(configured, span, files, options.thinning(image_rate, every), results_only, force)
     if asked_ns is not None:
         if output is not None or len(logs) > 1:
             raise UsageError("--at prints one answer for one log: leave -o out, and name a single log")
-        _at(logs[0], map_file, asked_ns, configured, span, json)
+        _at(logs[0], asked_ns, given, json)
         return
     if output is None:
         raise UsageError("localize needs -o FILE to write to, or --at TIME for one answer")
-    files = {"map": map_file, "model": model, "extrinsics": extrinsics}
-    given = Given(configured, span, files, options.thinning(image_rate, every), results_only, force)
     runs = run_over("localize", ["localize"], logs, output, given, lacking=True)
     finish("localize", runs, _document, _print, json)
 
@@ -85,18 +85,10 @@ def _print(runs: "list[LogRun]") -> None:
         say(f"{run.output}: {localized} bundles localized ({100 * share:.1f} %)")
 
 
-def _at(log: Path, map_file: Path, asked_ns: int, configured: Configured, span: "Span", json: bool) -> None:
-    from toolkit.runs.config import gather, load_files
+def _at(log: Path, asked_ns: int, given: Given, json: bool) -> None:
     from toolkit.runs.moment import localize_at
-    from toolkit.stage import Stage
-    from toolkit.stages import find_stage
 
-    stage = find_stage("localize")
-    assert isinstance(stage, Stage)  # noqa: S101 - build_map is the one reduction
-    config_file, settings, method = configured
-    config, files = load_files(stage, gather(config_file, settings or [], method), {"map": map_file})
-    with progress(f"localize {log.name}", log.stat().st_size if log.is_file() else None) as advance:
-        answer, reading = localize_at(stage, config, files, log, span, asked_ns, advance)
+    answer, reading = localize_at(given.requests([log])[0], asked_ns, progress)
     for loss in reading.losses:
         warn(f"warning: {log}: {loss}")
     if json:

@@ -1,6 +1,9 @@
 """Localize one moment of a recording: the answer that the whole run has for the bundle nearest to it."""
 
-from collections.abc import Iterator, Mapping
+import contextlib
+import dataclasses
+import tempfile
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,10 +13,14 @@ from toolkit.errors import UsageError
 from toolkit.geometry.se2 import Array
 from toolkit.messages.match import LandmarkMatch
 from toolkit.recording.association import WINDOW_NS
-from toolkit.recording.blocks import Progress
-from toolkit.recording.reader import open_recording
-from toolkit.runs.bundles import Reading, Span, inputs_of, read_bundles
-from toolkit.stage import Omission, Stage, Stamped
+from toolkit.runs.bench import Bench, Watch, open_bench, unwatched
+from toolkit.runs.bundles import Reading, inputs_of, read_bundles
+from toolkit.runs.plan import Request, Step, missing_stages, plan
+from toolkit.runs.step import size_bytes
+from toolkit.stage import Omission, Stamped
+from toolkit.stages import find_stage
+
+_LOCALIZE = "localize"
 
 
 @dataclass(slots=True)
@@ -29,37 +36,55 @@ class Answer:
     covariance: Array | None = None
 
 
-def localize_at(
-    stage: Stage,
-    config: Any,
-    resources: Mapping[str, Path],
-    path: Path,
-    span: Span,
-    time_ns: int,
-    progress: Progress | None = None,
-) -> tuple[Answer, Reading]:
+def localize_at(request: Request, time_ns: int, watch: Watch = unwatched) -> tuple[Answer, Reading]:
     """The answer for the bundle nearest to a time, from everything that the span holds before it.
 
+    Where the log lacks scene objects and results, they are made of what is before that time, and not kept.
+
     Raises:
-        UsageError: no bundle is within 2 s of that time.
-        RecordingError: the recording has no scene objects.
+        UsageError: no bundle is within 2 s of that time, or a setting or file is missing or wrong.
+        RecordingError: the recording has no scene objects and nothing to make them from.
     """
+    with tempfile.TemporaryDirectory(prefix="mcap-landmarks-") as folder:
+        parts = Path(folder)
+        with open_bench(request, parts, None) as bench:
+            before = missing_stages(find_stage(_LOCALIZE), bench.log)
+            if set(before) <= set(bench.log.results):
+                return _localized(bench, before, time_ns, watch)
+        end_ns = time_ns + 2 * WINDOW_NS
+        span = dataclasses.replace(request.span, end_ns=min(request.span.end_ns or end_ns, end_ns))
+        with open_bench(dataclasses.replace(request, span=span), parts, None) as bench:
+            return _localized(bench, before, time_ns, watch)
+
+
+def _localized(bench: Bench, before: list[str], time_ns: int, watch: Watch) -> tuple[Answer, Reading]:
+    *steps, last = plan(bench.request, bench.log, [*before, _LOCALIZE])
+    for step in steps:
+        bench.work(step, watch)
     reading = Reading()
-    with open_recording(path) as recording:
-        inputs = inputs_of(recording, stage.reads, stage.reads[:1], span.choice)
-        raws = recording.messages(tuple(inputs), span.start_ns, span.end_ns, progress)
-        bundles = read_bundles(raws, inputs, stage.reads, reading)
-        nearest: Answer | None = None
-        for answer in _answers(stage.process(bundles, config, resources)):
+    nearest: Answer | None = None
+    with contextlib.closing(_results(bench, last, reading, watch)) as results:
+        for answer in _answers(results):
             if nearest is None or abs(answer.stamp_ns - time_ns) < abs(nearest.stamp_ns - time_ns):
                 nearest = answer
             if answer.stamp_ns > time_ns + WINDOW_NS:
                 break
-        reading.close(recording.losses)
     if nearest is None or abs(nearest.stamp_ns - time_ns) > WINDOW_NS:
         known = "there is none at all" if nearest is None else f"the nearest is at {nearest.stamp_ns}"
-        raise UsageError(f"{path}: no bundle within 2 s of {time_ns}; {known}")
+        raise UsageError(f"{bench.log.path}: no bundle within 2 s of {time_ns}; {known}")
     return nearest, reading
+
+
+def _results(bench: Bench, step: Step, reading: Reading, watch: Watch) -> Generator[Stamped | Omission, None, None]:
+    view, span = bench.view(step.record), bench.request.span
+    inputs = inputs_of(view, step.stage.reads, step.stage.reads[:1], span.choice)
+    with watch(f"{step.stage.name} {view.path.name}", size_bytes(step, view, span)) as progress:
+        raws = view.messages(tuple(inputs), span.start_ns, span.end_ns, progress)
+        bundles = read_bundles(raws, inputs, step.stage.reads, reading)
+        try:
+            yield from step.stage.process(bundles, step.config, step.files)
+        finally:
+            reading.close(view.losses)
 
 
 def _answers(results: Iterator[Stamped | Omission]) -> Iterator[Answer]:
