@@ -1,6 +1,7 @@
 """Say what changed between two runs: two logs with results, or two landmark databases."""
 
 import math
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,8 +13,9 @@ from toolkit.cli.console import DONE, USAGE, moment, progress, say, say_json, ta
 from toolkit.errors import ToolkitError, UsageError
 
 DIFFERENT = 1
-_SHOWN = 3
+_SHOWN, _FIELDS = 3, 8
 _LONGEST = 60
+_HASH = re.compile("[0-9a-f]{32,}")
 
 
 def command(
@@ -107,7 +109,7 @@ def _print_counts(channels: dict[str, Any]) -> None:
         messages = channel["messages"]
         if channel["unit"] != "messages" and (messages["added"] or messages["removed"]):
             rows.append(["", *(str(messages[count]) for count in counts), "messages"])
-    table(["channel", *counts, "of"], rows)
+    table(["channel", *counts, "counted"], rows)
 
 
 def _print_channel(name: str, channel: dict[str, Any]) -> None:
@@ -128,20 +130,32 @@ def _print_channel(name: str, channel: dict[str, Any]) -> None:
             )
         if cases and channel[side] > _SHOWN:
             say(f"    and {channel[side] - _SHOWN} more")
-    for field, entry in channel["fields"].items():
-        largest = f", by {_difference(field, entry['largest'])} at most" if entry["largest"] else ""
-        say(f"  {field}: {entry['changed']} changed{largest}")
-        cases = [case for case in channel["worst"] if case["field"].partition("[")[0] == field]
-        for case in cases[:_SHOWN]:
-            values = (_value(case[side], field) for side in ("baseline", "candidate"))
-            say(f"    {_when(case)}{case['field'].removeprefix(field)}{' -> '.join(values)}")
+    fields = list(channel["fields"].items())
+    for field, entry in fields[:_FIELDS]:
+        case = next(case for case in channel["worst"] if case["field"].partition("[")[0] == field)
+        say(f"  {field}: {entry['changed']} changed{_how(field, entry, case)}")
+    if len(fields) > _FIELDS:
+        say(f"  and {len(fields) - _FIELDS} more fields: {', '.join(name for name, _ in fields[_FIELDS:])}")
+
+
+def _how(field: str, entry: dict[str, Any], case: dict[str, Any]) -> str:
+    """How a field changed: which words became which, else the worst case."""
+    if entry["transitions"]:
+        words = (
+            f"{way['baseline'] or 'none'} -> {way['candidate'] or 'none'} {way['count']}"
+            for way in entry["transitions"]
+        )
+        return ": " + ", ".join(words)
+    largest = f", by {_difference(field, entry['largest'])} at most" if entry["largest"] else ""
+    values = " -> ".join(_value(case[side], field) for side in ("baseline", "candidate"))
+    return f"{largest}; {_when(case)}{case['field'].removeprefix(field)} {values}".replace(":  ", ": ")
 
 
 def _print_metrics(metrics: dict[str, Any]) -> None:
     rows = [
         [name, *(_number(values[side]) for side in ("baseline", "candidate", "delta"))]
         for name, values in metrics.items()
-        if values["baseline"] != values["candidate"]
+        if values["baseline"] != values["candidate"] and not name.startswith("axis.")  # the thesis's own, in the JSON
     ]
     if rows:
         say()
@@ -166,8 +180,14 @@ def _value(value: Any, field: str = "") -> str:  # noqa: ANN401 - any JSON value
     if isinstance(value, list):
         if field.endswith(("orientation", "rotation")) and len(value) == 4:
             return _heading(value)
-        return ", ".join(_value(item) for item in value) or "none"
+        return _short(", ".join(_value(item) for item in value)) or "none"
     text = _number(value) if isinstance(value, int | float) else str(value)
+    if _HASH.fullmatch(text):
+        return f"{text[:12]}..."
+    return _short(text)
+
+
+def _short(text: str) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 

@@ -12,13 +12,22 @@ from toolkit.recording.reader import Recording
 from toolkit.stage import Connection
 
 Row = dict[str, Any]
-_FOLLOWS = re.compile(r"content|stages\.[^.]*\.(key|outcome|inputs|resources)(\..*)?")
+_FOLLOWS = re.compile(r"content|stages\.[^.]*\.(key|outcome|inputs|resources|code)(\..*)?")
 
 
 def manifest_rows(baseline: Recording, candidate: Recording) -> list[Row]:
     """What was meant to differ: each entry of the manifests that does, but for those that follow from others."""
     rows = rows_of(*(_entries(recording.metadata.get(RUN, {})) for recording in (baseline, candidate)))
     return [row for row in rows if not _FOLLOWS.fullmatch(row["key"])]
+
+
+def _code(stages: object) -> str | None:
+    """The version or versions of the program that the stages of a manifest ran with."""
+    if not isinstance(stages, dict):
+        return None
+    return (
+        " and ".join(sorted({str(entry.get("code")) for entry in stages.values() if isinstance(entry, dict)})) or None
+    )
 
 
 def rows_of(baseline: Mapping[str, object], candidate: Mapping[str, object]) -> list[Row]:
@@ -38,9 +47,12 @@ def structure_rows(baseline: Recording, candidate: Recording) -> list[Row]:
     rows = []
     for topic in sorted({*mine, *theirs}):
         types = [sorted({c.message_type for c in side.get(topic, ())}) for side in (mine, theirs)]
+        names = [" and ".join(side) or None for side in types]
+        if not all(types):
+            rows.append(_row("channel", topic, *names))
+            continue
         if types[0] != types[1]:
-            what = "type" if all(types) else "channel"
-            rows.append(_row(what, topic, *(" and ".join(names) or None for names in types)))
+            rows.append(_row("type", topic, *names))
         elif _undecided((*mine[topic], *theirs[topic])):
             rows.append(_row("definition", topic, *(_digest(side[topic]) for side in (mine, theirs))))
         number = counts[0].get(topic), counts[1].get(topic)
@@ -74,6 +86,8 @@ def _entries(record: Mapping[str, str]) -> dict[str, object]:
         except ValueError:
             value = text  # somebody else's manifest
         _flatten(key, value, found)
+        if key == "stages" and (code := _code(value)):
+            found["code"] = code
     return found
 
 

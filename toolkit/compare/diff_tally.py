@@ -14,6 +14,7 @@ from toolkit.stage import Tolerance
 
 WORST = 5
 """Cases that are kept of each field, of what was added and of what was removed."""
+_FEW_VALUES = ("status", "class", "frame_id")
 _TELLING = ("status", "score", "box_xyxy_px", "position_m")
 
 
@@ -41,12 +42,16 @@ class Case(NamedTuple):
 
 @dataclass(slots=True)
 class FieldTally:
-    """One field: in how many rows it is beyond its tolerance, the largest difference, and the worst cases."""
+    """One field: in how many rows it is beyond its tolerance, the largest difference, and the worst cases.
+
+    `transitions` count how often which text became which other.
+    """
 
     tolerance: Tolerance
     changed: int = 0
     largest: float = 0.0
     cases: list[Case] = field(default_factory=list)
+    transitions: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     def document(self) -> dict[str, object]:
         """An entry of `fields`; a difference that no number tells is null."""
@@ -54,6 +59,10 @@ class FieldTally:
             "changed": self.changed,
             "largest": self.largest if np.isfinite(self.largest) else None,
             "tolerance": self.tolerance._asdict(),
+            "transitions": [
+                {"baseline": before, "candidate": after, "count": count}
+                for (before, after), count in self.transitions.most_common(WORST)
+            ],
         }
 
 
@@ -137,6 +146,9 @@ class Tally:
     ) -> None:
         tally.changed += len(rows)
         tally.largest = max(tally.largest, float(apart[rows].max()))
+        if columns[0].kind is Kind.TEXT and columns[0].counts is None and name.endswith(_FEW_VALUES):
+            pairs = zip(*(column.values[rows, 0].tolist() for column in columns), strict=True)
+            tally.transitions.update((_text(before), _text(after)) for before, after in pairs)
         for row in rows[np.argsort(-apart[rows], kind="stable")][:WORST].tolist():
             size = float(apart[row])
             if len(tally.cases) == WORST and size <= tally.cases[-1].difference:

@@ -165,6 +165,7 @@ def _detections(counts: Rows, table: Table) -> Items:
     half = np.column_stack([columns.pop("bbox.size_x").values, columns.pop("bbox.size_y").values]) / 2
     boxes = np.column_stack([centre - half, centre + half])
     columns["box_xyxy_px"] = Column(Kind.NUMBER, boxes)
+    columns["pose.position"] = columns.pop("position_m")  # of a 3D estimate, which boxes seldom carry
     return Items(counts, Fields(columns, fields.counted), first["class"].values[:, 0], boxes=boxes)
 
 
