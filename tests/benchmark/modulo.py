@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.benchmark.rows import Row
+from tests.benchmark.stretches import in_parallel
 from toolkit.channels import POSE, SCENE_OBJECTS
 from toolkit.cli.main import run
 from toolkit.compare.read import read_reference
@@ -38,7 +39,8 @@ def modulo_rows(data: Path) -> Iterator[Row]:
         _call("map", logs / "robot1.mcap", "--from-reference", "--map", database)
         surveyed = read_map(database)
         write_map(database, dataclasses.replace(surveyed, classes=tuple(map(_renamed, surveyed.classes))))
-        counts = np.sum([_counts(log, database) for log in sorted(logs.glob("robot*.mcap"))], axis=0)
+        robots = sorted(logs.glob("robot*.mcap"))
+        counts = np.sum(in_parallel(lambda i: _counts(robots[i], database), len(robots)), axis=0)
     localized, wrong, large, large_localized = counts.tolist()
     yield Row("mrclam6_modulo_3", wrong / localized, at_most=0.01, cases=localized)
     yield Row("mrclam6_modulo_3_localized", large_localized / large, at_least=0.5, cases=large)

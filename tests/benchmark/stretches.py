@@ -62,8 +62,9 @@ def stretch(
 
 def in_parallel(one: Callable[[int], T], count: int) -> list[T]:
     """`one(i)` for every i below `count`, in order, on all cores; processes are forked, so `one` may be a closure."""
-    with ProcessPoolExecutor(os.cpu_count(), get_context("fork"), initializer=_prepare, initargs=(one,)) as pool:
-        return cast("list[T]", list(pool.map(_call, range(count), chunksize=_CHUNK)))
+    cores = os.cpu_count() or 1
+    with ProcessPoolExecutor(cores, get_context("fork"), initializer=_prepare, initargs=(one,)) as pool:
+        return cast("list[T]", list(pool.map(_call, range(count), chunksize=max(min(_CHUNK, count // (4 * cores)), 1))))
 
 
 _ready: list[Callable[[int], object]] = []
