@@ -69,16 +69,34 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 def progress(label: str, total: int | None = None, unit: str = "bytes") -> Iterator[Callable[[int], None]]:
     """A bar on stderr while the block runs, if stderr is a terminal; the block calls it with each advance.
 
-    `unit` is `bytes`, which shows a transfer rate, or the name of what is counted.
+    It shows how much is done of what, how fast, and the time that is left. `unit` names what is counted.
     """
     if not sys.stderr.isatty():
         yield lambda _advance: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, DownloadColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-    from rich.progress import TransferSpeedColumn as Speed
+    from rich.progress import (
+        BarColumn,
+        DownloadColumn,
+        MofNCompleteColumn,
+        Progress,
+        ProgressColumn,
+        Task,
+        TextColumn,
+        TimeRemainingColumn,
+        TransferSpeedColumn,
+    )
+    from rich.text import Text
 
-    amount = [DownloadColumn(), Speed()] if unit == "bytes" else [MofNCompleteColumn(), TextColumn(unit)]
+    class Rate(ProgressColumn):
+        """How many are done in a second."""
+
+        def render(self, task: Task) -> Text:
+            return Text(f"{task.speed:.1f}/s" if task.speed else "")
+
+    amount: list[ProgressColumn] = [DownloadColumn(), TransferSpeedColumn()]
+    if unit != "bytes":
+        amount = [MofNCompleteColumn(), TextColumn(unit), Rate()]
     columns = [TextColumn("{task.description}"), BarColumn(), *amount, TimeRemainingColumn()]
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=total)

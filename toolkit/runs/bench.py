@@ -2,10 +2,11 @@
 
 import contextlib
 import shutil
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Protocol
 
 from toolkit.channels import TF
 from toolkit.errors import RecordingError
@@ -13,15 +14,19 @@ from toolkit.manifest import Outcome, StageRecord
 from toolkit.recording.blocks import Progress
 from toolkit.recording.reader import Recording, open_recording
 from toolkit.runs.plan import Log, Request, Step
-from toolkit.runs.step import run_step, size_bytes
+from toolkit.runs.step import bundle_count, run_step
 from toolkit.runs.view import Layer, View, result_layers
 
-Watch = Callable[[str, int | None], AbstractContextManager[Progress]]
-"""Shows the progress of work with a label and a size in bytes, such as `toolkit.cli.console.progress`."""
+
+class Watch(Protocol):
+    """Shows the progress of work, such as `toolkit.cli.console.progress`."""
+
+    def __call__(self, label: str, total: int | None, unit: str = ..., /) -> AbstractContextManager[Progress]:
+        """What is done, how much there is to do, if that is known, and what is counted: bytes, if nothing is said."""
 
 
 @contextlib.contextmanager
-def unwatched(_label: str, _size: int | None) -> Iterator[Progress]:
+def unwatched(_label: str, _total: int | None, _unit: str = "bytes") -> Iterator[Progress]:
     """Shows nothing."""
     yield lambda _advance: None
 
@@ -107,7 +112,7 @@ class Bench:
             return found
         reason, (stage, span) = self._why(step.record), (step.stage, self.request.span)
         view, target = self.view(step.record), part_file(self._parts, step.record)
-        with watch(f"{stage.name} {self.log.path.name}", size_bytes(step, view, span)) as progress:
+        with watch(f"{stage.name} {self.log.path.name}", bundle_count(stage, view, span), "bundles") as progress:
             record = run_step(step, view, span, self.request.thinning, target, progress)
         self.take(target)
         return StageRun(stage.name, "ran", reason, record.outcome)

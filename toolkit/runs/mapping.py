@@ -24,7 +24,7 @@ from toolkit.runs.bundles import Reading, inputs_of, read_bundles
 from toolkit.runs.config import load
 from toolkit.runs.pipeline import check_output, told
 from toolkit.runs.plan import Request, Step, choice_options, inputs_of_stage, missing_stages, plan, record_of
-from toolkit.runs.step import outcome_of
+from toolkit.runs.step import bundle_count, counted, outcome_of
 from toolkit.stage import Reduction, Stamped
 from toolkit.stages import find_stage
 
@@ -181,7 +181,7 @@ def _build(
         outcome = dataclasses.replace(outcome, losses=losses, notes=notes)
         observations.append(found)
         logs.append(MappedLog(entry.request.recording, entry.fingerprint, tuple(runs), outcome, notes))
-    with watch("solve", None):
+    with watch("solve", None, "steps"):
         prior = read_map(task.prior) if task.prior is not None else None
         landmark_map, trajectories = stage.solve(observations, prior, config)
     for entry, trajectory in zip(plans, trajectories, strict=True):
@@ -204,9 +204,8 @@ def _collect(
     """
     span, reading, view = bench.request.span, Reading(), bench.view(entry.record)
     inputs = inputs_of(view, stage.reads, stage.reads, span.choice)
-    size = view.size_bytes(tuple(inputs), span.start_ns, span.end_ns)
-    with watch(f"read {view.path.name}", size) as progress:
-        raws = view.messages(tuple(inputs), span.start_ns, span.end_ns, progress)
+    with watch(f"read {view.path.name}", bundle_count(stage, view, span), "bundles") as progress:
+        raws = counted(view.messages(tuple(inputs), span.start_ns, span.end_ns), inputs, stage.reads[0], progress)
         observations = stage.collect(read_bundles(raws, inputs, stage.reads, reading), config)
     reading.close(view.losses)
     if not len(observations.stamps_ns):

@@ -16,7 +16,7 @@ from toolkit.recording.association import WINDOW_NS
 from toolkit.runs.bench import Bench, Watch, open_bench, unwatched
 from toolkit.runs.bundles import Reading, inputs_of, read_bundles
 from toolkit.runs.plan import Request, Step, missing_stages, plan
-from toolkit.runs.step import size_bytes
+from toolkit.runs.step import bundle_count, counted
 from toolkit.stage import Omission, Stamped
 from toolkit.stages import find_stage
 
@@ -78,8 +78,10 @@ def _localized(bench: Bench, before: list[str], time_ns: int, watch: Watch) -> t
 def _results(bench: Bench, step: Step, reading: Reading, watch: Watch) -> Generator[Stamped | Omission, None, None]:
     view, span = bench.view(step.record), bench.request.span
     inputs = inputs_of(view, step.stage.reads, step.stage.reads[:1], span.choice)
-    with watch(f"{step.stage.name} {view.path.name}", size_bytes(step, view, span)) as progress:
-        raws = view.messages(tuple(inputs), span.start_ns, span.end_ns, progress)
+    count = bundle_count(step.stage, view, span)
+    with watch(f"{step.stage.name} {view.path.name}", count, "bundles") as progress:
+        raws = view.messages(tuple(inputs), span.start_ns, span.end_ns)
+        raws = counted(raws, inputs, step.stage.reads[0], progress)
         bundles = read_bundles(raws, inputs, step.stage.reads, reading)
         try:
             yield from step.stage.process(bundles, step.config, step.files)

@@ -1,7 +1,7 @@
 """One stage over what it sees of a log: its results as a recording of their own."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -18,12 +18,10 @@ from toolkit.runs.plan import Step
 from toolkit.runs.tallies import tally
 from toolkit.runs.thinning import Thinning, thin
 from toolkit.runs.view import Readable, View
-from toolkit.stage import Channel, Connection, Omission, RawMessage, Stage, Stamped
+from toolkit.stage import Channel, Connection, Omission, RawMessage, Reduction, Stage, Stamped
 
 
-def run_step(
-    step: Step, view: View, span: Span, thinning: Thinning, target: Path, progress: Progress | None = None
-) -> StageRecord:
+def run_step(step: Step, view: View, span: Span, thinning: Thinning, target: Path, progress: Progress) -> StageRecord:
     """Run a stage over a view; its results, with the record that is returned, become the recording `target`.
 
     Raises:
@@ -55,10 +53,22 @@ def outcome_of(reading: Reading, counts: Counter[str] | None = None, notes: tupl
     return Outcome(reading.association.bundles, unreadable, counted, reading.notes(), tuple(reading.losses), notes)
 
 
-def size_bytes(step: Step, view: View, span: Span) -> int:
-    """The bytes that a stage will have to read."""
-    inputs = inputs_of(view, step.stage.reads, step.stage.reads[:1], span.choice)
-    return view.size_bytes(tuple(inputs), span.start_ns, span.end_ns)
+def bundle_count(stage: Stage | Reduction, view: View, span: Span) -> int:
+    """About how many bundles a stage will have to work on."""
+    inputs = inputs_of(view, stage.reads, stage.reads[:1], span.choice)
+    return view.count(
+        [entry for entry, channel in inputs.items() if channel == stage.reads[0]], span.start_ns, span.end_ns
+    )
+
+
+def counted(
+    raws: Iterator[RawMessage], inputs: Mapping[Connection, Channel[Any]], primary: Channel[Any], progress: Progress
+) -> Iterator[RawMessage]:
+    """The messages as they are; `progress` is told of each one that makes a bundle."""
+    for raw in raws:
+        yield raw
+        if inputs.get(raw.connection) == primary:
+            progress(1)
 
 
 def _raws(
@@ -68,7 +78,7 @@ def _raws(
     span: Span,
     thinning: Thinning,
     reading: Reading,
-    progress: Progress | None,
+    progress: Progress,
 ) -> Iterator[RawMessage]:
     """The messages that a stage reads, without the images that thinning leaves out."""
     thinned = stage.reads[0] == CAMERA_IMAGE and bool(thinning.options())
@@ -76,7 +86,7 @@ def _raws(
     if thinned and thinning.by_motion and not odometry:
         raise UsageError(f"{view.path}: --every needs odometry, and there is none; use --image-rate")
     wanted = {*inputs, *odometry}
-    raws = view.messages(wanted, span.start_ns, span.end_ns, progress)
+    raws = counted(view.messages(wanted, span.start_ns, span.end_ns), inputs, stage.reads[0], progress)
     if thinned:
         images = [connection for connection, channel in inputs.items() if channel == CAMERA_IMAGE]
         raws = thin(raws, images, odometry, thinning, reading.dropped)

@@ -76,6 +76,16 @@ class View:
         """See `Recording.size_bytes`."""
         return sum(layer.recording.size_bytes(wanted, start_ns, end_ns) for layer, wanted in self._wanted(connections))
 
+    def count(self, connections: Collection[Connection], start_ns: int | None, end_ns: int | None) -> int:
+        """About how many messages there are, as if they came evenly."""
+        total = 0.0
+        for layer in self.layers:
+            first, last = layer.recording.start_ns or 0, layer.recording.end_ns or 0
+            share = (min(end_ns or last, last) - max(start_ns or first, first)) / max(last - first, 1)
+            count = sum(entry.count for entry in layer.channels if entry.connection in connections)
+            total += count * (share if (start_ns, end_ns) != (None, None) else 1.0)
+        return max(round(total), 0)
+
     def _wanted(self, connections: Collection[Connection] | None) -> list[tuple[Layer, list[Connection]]]:
         found = []
         for layer in self.layers:
