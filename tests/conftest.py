@@ -12,6 +12,10 @@ settings.register_profile("fixed", derandomize=True, deadline=None)
 settings.load_profile("fixed")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--update-golden", action="store_true", help="write the results in tests/golden/ anew")
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of the data that others made; tests that need it are skipped where it is missing."""
