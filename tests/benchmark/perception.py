@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from tests.benchmark import fusion
 from tests.benchmark.centres import FARTHEST_M, Errors, judge, within
 from tests.benchmark.rows import Row, main
 
@@ -33,6 +34,7 @@ LIMITS_M = {
 def measure(quick: bool) -> Iterator[Row]:
     """All rows."""
     yield from centres(120 if quick else 600)
+    yield from fusion.rows(quick)
 
 
 def centres(count: int) -> Iterator[Row]:
