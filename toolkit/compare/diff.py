@@ -97,7 +97,8 @@ def _of_logs(
 def _of_maps(
     baseline: Path, candidate: Path, tolerances: Sequence[str], conditions: Sequence[Condition], *, aligned: bool
 ) -> Diff:
-    limits = asked(tolerances, FIELDS)
+    ours, given = declared(), asked(tolerances, FIELDS)
+    limits = {part: {**ours.get(part, {}), **given.get(part, {})} for part in FIELDS}
     found = diff_maps(read_map(baseline), read_map(candidate), _lookup(limits), aligned=aligned)
     document = _document(
         {"landmarks": found.landmarks, "groups": found.groups},

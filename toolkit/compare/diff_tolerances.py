@@ -4,8 +4,9 @@ import re
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 
+from toolkit.compare.diff_maps import FIELDS as MAP_FIELDS
 from toolkit.errors import UsageError
-from toolkit.stage import Tolerance
+from toolkit.stage import Reduction, Tolerance
 from toolkit.stages import find_stage, stage_names
 
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
@@ -15,15 +16,16 @@ Declared = Mapping[str, Mapping[str, Tolerance]]
 
 
 def declared() -> Declared:
-    """Tolerances by topic and field, as the stages that write the topics declare them."""
+    """Tolerances by topic and field, as the stages that write the topics or the database declare them."""
     found: dict[str, dict[str, Tolerance]] = {}
     for stage in map(find_stage, stage_names()):
         fields = {
             name: value if isinstance(value, Tolerance) else Tolerance(float(value))
             for name, value in stage.tolerance.items()
         }
-        for channel in stage.writes:
-            found.setdefault(channel.topic, {}).update(fields)
+        parts = MAP_FIELDS if isinstance(stage, Reduction) else ()  # it makes the database
+        for name in (*parts, *(channel.topic for channel in stage.writes)):
+            found.setdefault(name, {}).update(fields)
     return found
 
 

@@ -11,7 +11,7 @@ from toolkit.errors import MapError
 from toolkit.landmarks.model import LandmarkMap
 from toolkit.landmarks.observations import LogObservations, Trajectory
 from toolkit.landmarks.sightings import known_covariances
-from toolkit.stage import Bundle, Reduction
+from toolkit.stage import Bundle, Reduction, Tolerance
 from toolkit.stages._build_map_default import solve_jointly
 from toolkit.stages._build_map_thesis import solve_as_in_the_thesis
 
@@ -93,5 +93,12 @@ STAGE = Reduction(
     config=BuildMapConfig,
     collect=collect,
     solve=solve,
-    tolerance={"position_m": 1e-4, "orientation": 1e-5, "size_m": 1e-4},
+    tolerance={
+        "position_m": 1e-4,
+        "orientation": 1e-5,
+        "size_m": 1e-4,
+        "radius_m": 1e-4,
+        "heading_rad": 1e-5,
+        "covariance": Tolerance(1e-9, 1e-3),
+    },
 )
