@@ -1,5 +1,7 @@
 """Fusion: classes to the right places, from images that err and scans that see more than the camera."""
 
+import dataclasses
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -155,7 +157,7 @@ def test_an_object_cut_by_the_images_edge_is_still_found() -> None:
 def test_classes_are_chosen_and_ignored() -> None:
     scenes, left_out = fused([plain()], FuseConfig(landmark_classes=("person", "suitcase")))
     assert scenes[0].classes == ("person", "suitcase")
-    assert left_out == ["detections of classes that are no landmarks"]
+    assert left_out == ["detections of classes that are no landmarks, or without a box"]
     scenes, _ = fused([plain()], FuseConfig(ignore_classes=("person",)))
     assert scenes[0].classes == ("fire hydrant", "suitcase")
 
@@ -164,6 +166,44 @@ def test_one_object_is_no_scene() -> None:
     scenes, _ = fused([plain(SECOND, THREE[:1]), plain(SECOND, ())])
     assert [len(scene) for scene in scenes] == [0, 0]
     assert len(fused([plain(SECOND, THREE[:1])], FuseConfig(min_objects=1))[0][0]) == 1
+
+
+def test_what_is_nowhere_is_left_out() -> None:
+    whole, objects = detected(NAMES, boxes(THREE), SECOND), scanned((*THREE, THREE[0]), SECOND)
+    objects.positions_xy[3][:] = np.nan
+    odd = np.concatenate([whole.boxes_xyxy, [[10.0, 20.0, 5.0, 30.0], [np.nan, 0.0, 9.0, 9.0]]])
+    given = dataclasses.replace(
+        whole, ids=("",) * 5, hypotheses=whole.hypotheses + ((("person", 0.9),),) * 2, boxes_xyxy=odd
+    )
+    scenes, left_out = fused([bundle(objects, given)])
+    check(scenes[0], THREE)
+    assert Counter(left_out) == {
+        "detections of classes that are no landmarks, or without a box": 2,
+        "scan objects without a finite place": 1,
+    }
+    scenes, left_out = fused([bundle(scanned((), SECOND), whole)])
+    assert len(scenes[0]) == 0
+    assert len(left_out) == 3
+
+
+def test_a_merged_cluster_is_no_object() -> None:
+    """Where the bare surface alone explains the hits, or a class has no hypothesis, there is no centre to trust."""
+    objects, given = scanned(THREE, SECOND), detected(NAMES, boxes(THREE), SECOND)
+    bare = tuple((name, 1e-6) for name, _ in objects.hypotheses[0][:-1])
+    hypotheses = ((*bare, ("", 1.0)), (("", 1.0),), objects.hypotheses[2])
+    positions = (objects.positions_xy[0], objects.positions_xy[1][-1:], objects.positions_xy[2])
+    covariances = (objects.covariances[0], objects.covariances[1][-1:], objects.covariances[2])
+    merged = dataclasses.replace(objects, hypotheses=hypotheses, positions_xy=positions, covariances=covariances)
+    scenes, _ = fused([bundle(merged, given)] * 5, FuseConfig(min_objects=1))
+    assert [scene.classes for scene in scenes] == [("suitcase",)] * 5
+
+
+def test_what_stands_beside_a_box_again_and_again_is_not_in_it() -> None:
+    beside = Thing("cone", 5.0, 1.16)
+    things = (beside, *THREE[1:])
+    given = detected(NAMES, boxes(THREE), SECOND)
+    scenes, _ = fused([bundle(scanned(things, SECOND), given)] * 20)
+    assert scenes[-1].classes == tuple(NAMES[1:])
 
 
 def test_two_tracks_of_one_object_are_one() -> None:

@@ -102,6 +102,8 @@ def choose(recording: Readable, channel: Channel[Any], choice: Choice) -> tuple[
     present = [(topic, connection.message_type) for topic, connection in named]
     asked = choice.topics.get(role.name)
     fitting = topics_for(role, present)
+    if asked is None and len(fitting) > 1 and channel == channels.CAMERA_INFO:
+        fitting = _of_the_image(recording, fitting, choice)
     if asked is None and len(fitting) > 1:
         how = f"{role.option} TOPIC" if role.option != "--remap" else f"--remap TOPIC={channel.topic}"
         raise UsageError(f"{recording.path}: {' and '.join(fitting)} could be the {role.name}; choose with {how}")
@@ -118,6 +120,15 @@ def choose(recording: Readable, channel: Channel[Any], choice: Choice) -> tuple[
                 f"{' or '.join(role.types)}"
             )
     return found
+
+
+def _of_the_image(recording: Readable, infos: list[str], choice: Choice) -> list[str]:
+    """The topics of CameraInfo that share most namespaces with the image; all where that does not tell them apart."""
+    images = choose(recording, channels.CAMERA_IMAGE, choice)
+    if not images:
+        return infos
+    shared = {topic: _shared(images[0].topic, topic) for topic in infos}
+    return [topic for topic in infos if shared[topic] == max(shared.values())]
 
 
 def message_type(channel: Channel[Any], connection: Connection) -> type[Message]:

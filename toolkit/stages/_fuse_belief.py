@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass, field
 
-_REMEMBERED, _TOO_FAR_ASIDE = 5, 3.0
+_REMEMBERED, _TOO_FAR_ASIDE = 5, 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,15 @@ class Belief:
         self.other = math.log(self.weighing.prior)
 
     def hit(self, name: str, score: float, aside: float) -> None:
-        """A detection of a class fell on the track, so many sigmas aside of its middle."""
+        """A detection of a class fell on the track, so many sigmas aside of its middle.
+
+        If they always do so on the same side, they are of something beside it, and count as a miss.
+        """
+        self.hits += 1
+        self.aside += (aside - self.aside) / min(self.hits, _REMEMBERED)
+        if self.hits > 1 and abs(self.aside) * math.sqrt(min(self.hits, _REMEMBERED)) > _TOO_FAR_ASIDE:
+            self.miss()
+            return
         weighing, sure = self.weighing, min(max(score, 0.05), 0.95)
         gain = math.log(weighing.gain * sure / (1 - sure))
         confused = gain + math.log(weighing.confusion)
@@ -49,14 +57,7 @@ class Belief:
         self.log_odds = {known: value + confused for known, value in self.log_odds.items()}
         self.log_odds[name] += gain - confused
         self.other += confused
-        self.hits += 1
-        self.aside += (aside - self.aside) / min(self.hits, _REMEMBERED)
         self._limit()
-
-    @property
-    def leans(self) -> bool:
-        """Whether the detections were always on the same side: they are of something beside the track."""
-        return abs(self.aside) * math.sqrt(min(self.hits, _REMEMBERED)) > _TOO_FAR_ASIDE
 
     def miss(self) -> None:
         """An image shows the track's place, and nothing there."""

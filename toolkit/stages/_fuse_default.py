@@ -17,7 +17,7 @@ from toolkit.stages._fuse_sights import BoxError, Sights, View, misfits, sights_
 from toolkit.stages._fuse_sizes import ANY_SIZE, Size
 
 _NEVER = 1e6
-_KEPT_BUNDLES = 100
+_KEPT_BUNDLES = 1000
 _LEAST_SHARE = 0.02
 _ALONE = 12.0
 """What it costs a box to be of nothing in the scan, such as an object too far away or too thin for the LiDAR."""
@@ -97,10 +97,7 @@ class Fuser:
         hit = {i for _, i in pairs}
         nearness = self._nearness(objects, pairs, view, names, sights)
         for i, belief in enumerate(beliefs):
-            beside = belief.leans and belief.hits > 1
-            if belief.hits and (
-                beside or (i not in hit and self._is_missed(objects, i, belief, sights, nearness, view))
-            ):
+            if belief.log_odds and i not in hit and self._is_missed(objects, i, belief, sights, nearness, view):
                 belief.miss()
         return len(detections) - len(pairs)
 
@@ -127,7 +124,7 @@ class Fuser:
     ) -> Array:
         """How far from the camera what is in the boxes (M,) is; at least, where that goes by height only."""
         sizes = [self._rules.sizes.get(name, ANY_SIZE) for name in names]
-        tall = np.array([max(size.tall_m[0], size.top_m[0] - size.foot_m[1]) for size in sizes])
+        tall = np.array([size.least_tall_m for size in sizes])
         nearness = _SMALLER * tall / np.maximum(sights.top - sights.bottom, 1e-3)
         for box, i in pairs:
             nearness[box] = np.hypot(*view.from_camera(objects.positions_xy[i][-1:])[0])
@@ -143,7 +140,7 @@ class Fuser:
         point = self._centres(objects, name).positions_xy[i]
         place = view.from_camera(point[None])[0]
         distance, half_width = float(np.hypot(*place)), size.width_m[0] / 2
-        height_px = (size.top_m[0] - size.foot_m[1]) / max(distance, 0.1) * view.camera.intrinsics[1, 1]
+        height_px = size.least_tall_m / max(distance, 0.1) * view.camera.intrinsics[1, 1]
         if height_px < self._rules.least_height_px or not view.shows(point, half_width, middle_m):
             return False
         before = nearness < distance
@@ -159,7 +156,7 @@ class Fuser:
         found = []
         for i, track in enumerate(objects.ids):
             belief = self._tracks[track].belief
-            options = belief.probabilities() if belief.hits else []
+            options = belief.probabilities() if belief.log_odds else []
             if options and self._is_clear(objects, i, *options[0]):
                 told = tuple((name, share) for name, share in options if share >= _LEAST_TOLD)
                 found.append((options[0][1], i, told))

@@ -20,6 +20,11 @@ class Size:
     foot_m: Span = (0.0, 0.0)
     tall_m: Span = (0.0, 100.0)
 
+    @property
+    def least_tall_m(self) -> float:
+        """The least height of a box."""
+        return max(self.tall_m[0], self.top_m[0] - self.foot_m[1])
+
 
 SIZES: dict[str, Size] = {
     "person": Size(top_m=(1.5, 1.95), width_m=(0.3, 0.9), radius_m=0.25),

@@ -28,7 +28,8 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Positive = Annotated[float, Field(gt=0)]
 
 _UNEXPLAINED = "detections where the scan has no object that fits"
-_UNWANTED = "detections of classes that are no landmarks"
+_UNWANTED = "detections of classes that are no landmarks, or without a box"
+_UNUSABLE = "scan objects without a finite place"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,10 +82,10 @@ def process(
     fuser, mounting = Fuser(_rules(config)), Mounting(resources.get("extrinsics"))
     scans = images = 0
     for bundle in bundles:
-        objects = bundle.get(SCAN_OBJECTS)
-        if objects is None:
+        found = bundle.get(SCAN_OBJECTS)
+        if found is None:
             continue
-        given = bundle.get(DETECTIONS)
+        objects, given = _usable(found), bundle.get(DETECTIONS)
         scans, images = scans + 1, images + (given is not None)
         detections = None if given is None else _wanted(given, config)
         if config.method == "thesis":
@@ -96,10 +97,13 @@ def process(
             scene = _nothing(scene)
         yield Stamped(SCENE_OBJECTS, bundle.log_time_ns, scene)
         yield Stamped(SCENE_MARKERS, bundle.log_time_ns, markers_from_scene(scene))
-        for _ in range(unexplained):
-            yield Omission(bundle.log_time_ns, _UNEXPLAINED)
-        for _ in range(len(given) - len(detections) if given and detections else 0):
-            yield Omission(bundle.log_time_ns, _UNWANTED)
+        left_out = {
+            _UNEXPLAINED: unexplained,
+            _UNWANTED: 0 if given is None or detections is None else len(given) - len(detections),
+            _UNUSABLE: len(found) - len(objects),
+        }
+        for reason, count in left_out.items():
+            yield from [Omission(bundle.log_time_ns, reason)] * count
     if scans and not images:
         raise RecordingError(
             f"no {DETECTIONS.topic} lie beside any of {scans} scans; run mcap-landmarks detect first, or read others "
@@ -120,20 +124,39 @@ def _rules(config: FuseConfig) -> Rules:
     )
 
 
+def _usable(objects: ScanObjects) -> ScanObjects:
+    """The scan objects that are somewhere."""
+    places = zip(objects.positions_xy, objects.covariances, strict=True)
+    keep = [
+        i for i, (xy, spread) in enumerate(places) if len(xy) and np.isfinite(xy).all() and np.isfinite(spread).all()
+    ]
+    return ScanObjects(
+        objects.stamp_ns,
+        objects.frame_id,
+        tuple(objects.ids[i] for i in keep),
+        tuple(objects.hypotheses[i] for i in keep),
+        tuple(objects.positions_xy[i] for i in keep),
+        tuple(objects.covariances[i] for i in keep),
+        objects.extents_m[keep],
+    )
+
+
 def _wanted(detections: Detections, config: FuseConfig) -> Detections:
-    """The detections whose class may be a landmark's."""
+    """The detections that are boxes of what may be a landmark."""
     classes = [options[0][0] if options else "" for options in detections.hypotheses]
+    boxes = detections.boxes_xyxy
+    whole = np.flatnonzero(np.isfinite(boxes).all(axis=1) & (boxes[:, 2:] > boxes[:, :2]).all(axis=1)).tolist()
     keep = [
         i
         for i, name in enumerate(classes)
-        if name and name not in config.ignore_classes and name in (config.landmark_classes or classes)
+        if i in whole and name and name not in config.ignore_classes and name in (config.landmark_classes or classes)
     ]
     return Detections(
         detections.stamp_ns,
         detections.frame_id,
         tuple(detections.ids[i] for i in keep),
         tuple(detections.hypotheses[i] for i in keep),
-        detections.boxes_xyxy[keep].reshape(-1, 4),
+        boxes[keep].reshape(-1, 4),
     )
 
 
