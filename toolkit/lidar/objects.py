@@ -10,9 +10,9 @@ from toolkit.geometry.se2 import Array, rotation
 from toolkit.lidar.beams import Beams
 from toolkit.lidar.cells import Noise
 from toolkit.lidar.centres import centres
-from toolkit.lidar.segments import Segment, extent_m
+from toolkit.lidar.segments import Cluster, extent_m, gap_m, points_of
 from toolkit.lidar.shapes import Shape
-from toolkit.lidar.windows import Cluster, windows
+from toolkit.lidar.windows import windows
 
 _NONE = 0.1
 """How likely something is of no known shape, before anyone looks."""
@@ -44,7 +44,7 @@ class Hypotheses:
 class _Explained:
     """A cluster under H hypotheses, the last one the bare surface: log_evidence (H,), positions (H, 2), (H, 2, 2).
 
-    `total` is the logarithm of the evidence for one object here; of several segments, for one of known shape.
+    `total` is the logarithm of the evidence for one object here; of two that are joined, for one of known shape.
     """
 
     log_evidence: Array
@@ -64,19 +64,19 @@ class _Pair:
 
 
 def objects(
-    beams: Beams, segments: Sequence[Segment], shapes: Mapping[str, Sequence[Shape]], noise: Noise
+    beams: Beams, clusters: Sequence[Cluster], shapes: Mapping[str, Sequence[Shape]], noise: Noise
 ) -> list[Hypotheses]:
     """The objects of a scan, each with every class of `shapes` that it could be, by name with the shapes of a class.
 
-    Neighbouring segments make one object where that explains them better than an object each: the legs of a person, a
+    Neighbouring clusters make one object where that explains them better than an object each: the legs of a person, a
     box and its far corner, or what two LiDARs see of one thing.
     """
     kinds = [(name, shape) for name, options in shapes.items() for shape in options]
     explain = _Explainer(beams, kinds, _priors(shapes), noise)
-    clusters = _joined(beams, segments, explain)
+    joined = _joined(beams, clusters, explain)
     return [
         _ranked([name for name, _ in kinds], explained, beams, cluster)
-        for cluster, explained in zip(clusters, explain(clusters), strict=True)
+        for cluster, explained in zip(joined, explain(joined), strict=True)
     ]
 
 
@@ -156,7 +156,7 @@ class _Explainer:
                 evidence,
                 np.vstack([found.positions_xy[i, self._row], point]),
                 np.concatenate([found.covariances[i, self._row] + vague[:, None, None] * np.eye(2), spread[None]]),
-                _log_sum(evidence if len(cluster) == 1 else shaped + self._log_priors[:-1]) + _LOG_PER_M2,
+                _log_sum(evidence if allowed[i].all() else shaped + self._log_priors[:-1]) + _LOG_PER_M2,
             )
 
 
@@ -184,10 +184,10 @@ def _surface(beams: Beams, cluster: Cluster, spacing_m: float, noise: Noise) -> 
     return points.mean(axis=0) + frame @ np.array([depth.mean(), middle]), spread
 
 
-def _joined(beams: Beams, segments: Sequence[Segment], explain: _Explainer) -> list[Cluster]:
-    """The clusters that explain the segments best, found by joining the pair that gains most again and again."""
-    clusters: list[Cluster] = [(segment,) for segment in segments]
-    points = {cluster: beams.points_xy[cluster[0].hits(beams)] for cluster in clusters}
+def _joined(beams: Beams, given: Sequence[Cluster], explain: _Explainer) -> list[Cluster]:
+    """The clusters that explain the given ones best, found by joining the pair that gains most again and again."""
+    clusters = list(given)
+    points = {cluster: points_of(beams, cluster) for cluster in clusters}
     while True:
         pairs = _pairs(clusters, points, explain)
         found = [one.total for one in explain(clusters, pairs)]
@@ -216,18 +216,12 @@ def _pairs(clusters: Sequence[Cluster], points: Mapping[Cluster, Array], explain
     found = []
     for i, j in zip(*np.nonzero(np.triu(apart <= explain.widest_m, k=1)), strict=True):
         first, second = clusters[i], clusters[j]
-        gap_m = _gap_m(points[first], points[second])
-        shapes = explain.bridging(gap_m, (2 * radii[i], 2 * radii[j]), _is_one_view(first, second))
+        gap = gap_m(points[first], points[second])
+        shapes = explain.bridging(gap, (2 * radii[i], 2 * radii[j]), _is_one_view(first, second))
         if shapes.any():
             both = tuple(sorted((*first, *second), key=lambda one: (one.sweep, one.first)))
             found.append(_Pair(first, second, both, shapes))
     return found
-
-
-def _gap_m(first: Array, second: Array) -> float:
-    """The distance between the nearest points (N, 2) and (M, 2)."""
-    offsets = first[:, None] - second
-    return float(np.sqrt((offsets**2).sum(axis=-1).min()))
 
 
 def _ranked(names: Sequence[str], explained: _Explained, beams: Beams, cluster: Cluster) -> Hypotheses:
@@ -235,11 +229,10 @@ def _ranked(names: Sequence[str], explained: _Explained, beams: Beams, cluster: 
     share /= share.sum()
     possible = np.flatnonzero(np.isfinite(explained.log_evidence[:-1]))
     order = [*possible[np.argsort(-share[possible], kind="stable")].tolist(), len(names)]
-    hits = np.concatenate([segment.hits(beams) for segment in cluster])
     return Hypotheses(
         tuple([*names, ""][i] for i in order),
         share[order],
         explained.positions_xy[order],
         explained.covariances[order],
-        extent_m(beams.points_xy[hits]),
+        extent_m(points_of(beams, cluster)),
     )

@@ -1,6 +1,6 @@
 """Segments of a scan: runs of neighbouring beams that met one surface."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +43,36 @@ class Segment:
         """The indices of the beams that met something."""
         found = self.beams(beams)
         return found[np.isfinite(beams.ranges_m[found])]
+
+
+Cluster = tuple[Segment, ...]
+"""The segments that make one object."""
+
+
+def gap_m(first_xy: Array, second_xy: Array) -> float:
+    """The distance between the nearest of points (N, 2) and (M, 2)."""
+    offsets = first_xy[:, None] - second_xy
+    return float(np.sqrt((offsets**2).sum(axis=-1).min()))
+
+
+def points_of(beams: Beams, cluster: Cluster) -> Array:
+    """The hits (N, 2) of a cluster."""
+    points: Array = beams.points_xy[np.concatenate([segment.hits(beams) for segment in cluster])]
+    return points
+
+
+def near_clusters(beams: Beams, found: Sequence[Segment], near_m: float) -> list[Cluster]:
+    """Segments as clusters, those together that are no more than `near_m` from one another, whatever lies behind."""
+    clusters: list[Cluster] = []
+    points: list[Array] = []
+    for segment in found:
+        hits = points_of(beams, (segment,))
+        rows = [i for i, other in enumerate(points) if gap_m(hits, other) <= near_m]
+        cluster: Cluster = (*(one for i in rows for one in clusters[i]), segment)
+        joint = np.concatenate([*(points[i] for i in rows), hits])
+        clusters = [*(one for i, one in enumerate(clusters) if i not in rows), cluster]
+        points = [*(one for i, one in enumerate(points) if i not in rows), joint]
+    return clusters
 
 
 def extent_m(points_xy: Array) -> float:

@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 
 from toolkit.geometry.se2 import Array
 from toolkit.lidar.beams import Beams
-from toolkit.lidar.segments import Segment
+from toolkit.lidar.segments import Cluster, Segment
 
-Cluster = tuple[Segment, ...]
-"""The segments that make one object."""
 Floats = NDArray[np.float32]
 
 _DENSE_M, _FAR_BESIDE_M, _APART_M = 0.65, 5.0, 0.03

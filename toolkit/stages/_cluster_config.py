@@ -109,11 +109,12 @@ class ClusterConfig:
     parts); classes that are not named keep theirs, an empty list takes one out. `sigma_m`: noise of a range; `dropout`:
     share of beams that return nothing from an object; `stray`: share of hits that are something else's.
     `incidence_deg`: no surface is met at a smaller angle, so that neighbouring hits farther apart are of two; `link_m`:
-    hits of one piece are no farther apart. What is larger than `largest_m` is background; unset, what is larger than
-    every shape. `range_m` and `view_deg` limit what is looked at: distances from the LiDAR, bearings in the base frame,
-    counter-clockwise from, to; unset, all that the scan gives. `gate_m`: how far an object may be from where it was
-    last, through odometry, and keep its id, which is kept for `memory_s` without being seen. Of a point cloud the
-    points between the heights `slice_m` in the base frame count, the nearest one in every `slice_beam_deg`.
+    hits of one piece are no farther apart, and pieces no farther apart than `near_m` are one. What is larger than
+    `largest_m` is background; unset, what is larger than every shape. `range_m` and `view_deg` limit what is looked at:
+    distances from the LiDAR, bearings in the base frame, counter-clockwise from, to; unset, all that the scan gives.
+    `gate_m`: how far an object may be from where it was last, through odometry, and keep its id, which is kept for
+    `memory_s` without being seen. Of a point cloud the points between the heights `slice_m` in the base frame count,
+    the nearest one in every `slice_beam_deg`.
 
     The thesis (Algorithm 2) has 0 to 30 and 330 to 360 degrees, 0.5 to 15 m, and the middle beam of every run of hits.
     """
@@ -125,6 +126,7 @@ class ClusterConfig:
     stray: Share = 0.01
     incidence_deg: Annotated[float, Field(gt=0, lt=90)] = 10.0
     link_m: Positive = 0.3
+    near_m: Positive = 0.13
     largest_m: Positive | None = None
     range_m: tuple[float, float] | None = None
     view_deg: tuple[float, float] | None = None

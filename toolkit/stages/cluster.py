@@ -9,7 +9,7 @@ from toolkit.channels import ODOMETRY, SCAN, SCAN_FILTERED, SCAN_OBJECTS, SECOND
 from toolkit.lidar.beams import Beams
 from toolkit.lidar.cells import Noise
 from toolkit.lidar.objects import Hypotheses, objects
-from toolkit.lidar.segments import Breaks, segments
+from toolkit.lidar.segments import Breaks, near_clusters, segments
 from toolkit.lidar.shapes import Shape
 from toolkit.messages.scan_objects import ScanObjects
 from toolkit.stage import Bundle, Omission, Stage, Stamped
@@ -62,7 +62,7 @@ def cluster(beams: Beams, shapes: Shapes, config: ClusterConfig) -> list[Hypothe
     largest = 2 * reach + 6 * config.sigma_m if config.largest_m is None else config.largest_m
     breaks = Breaks(np.deg2rad(config.incidence_deg), config.sigma_m, config.link_m)
     noise = Noise(config.sigma_m, config.dropout, config.stray)
-    return objects(beams, segments(beams, breaks, largest), shapes, noise)
+    return objects(beams, near_clusters(beams, segments(beams, breaks, largest), config.near_m), shapes, noise)
 
 
 def _message(stamp_ns: int, base: str, names: tuple[str, ...], found: Sequence[Hypotheses]) -> ScanObjects:
