@@ -1,15 +1,18 @@
 """Our figures against evo's, to 1e-6."""
 
 import warnings
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from toolkit.compare.metrics import Outcome, Reference, evaluate
+from toolkit.compare.read import read_reference, read_run
 from toolkit.compare.trajectory import Pairs, Trajectory, nearest
 from toolkit.geometry.angles import quaternion_from_yaw
 from toolkit.geometry.se2 import compose
+from toolkit.resources import resource
 
 EPOCH_NS = 1_288_971_842_000_000_000
 WITHIN_NS = 10_000_000
@@ -100,4 +103,16 @@ def test_a_sparser_reference_is_paired_evos_way_too(aligned: bool) -> None:
     sparse = disturbed(dense, 4, 5, 8_000_000)
     mine, theirs = ours(dense, sparse, aligned=aligned), evos(dense, sparse, aligned=aligned)
     assert mine.pairs > 50
+    assert mine == pytest.approx(theirs, abs=1e-6)
+
+
+@pytest.mark.parametrize("aligned", [False, True])
+@pytest.mark.parametrize(("result", "truth"), [("localize", "demo_localize"), ("map", "demo_map")])
+def test_figures_of_the_bundled_recordings_are_evos(result: str, truth: str, aligned: bool) -> None:
+    golden = Path(__file__).parents[1] / "golden" / f"{result}.mcap"
+    estimate = read_run(golden)[0].trajectory
+    reference = read_reference(resource("recordings", f"{truth}.mcap"))[0].trajectory
+    assert reference is not None
+    mine, theirs = ours(estimate, reference, aligned=aligned), evos(estimate, reference, aligned=aligned)
+    assert mine.pairs == len(estimate) > 50
     assert mine == pytest.approx(theirs, abs=1e-6)

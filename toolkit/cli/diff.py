@@ -38,6 +38,9 @@ def command(
             "> 0.01' or 'channels./landmarks/pose.removed > 0'; repeatable.",
         ),
     ] = None,
+    reference: Annotated[
+        Path | None, typer.Option("--reference", help="Where the truth is, for a side that has none: a log, or .tum.")
+    ] = None,
     align: Annotated[
         bool, typer.Option("--align", help="Of databases: move the candidate by the one SE(2) that fits best.")
     ] = False,
@@ -55,13 +58,17 @@ def command(
     try:
         conditions = [parse(text) for text in fail_on or []]
         with progress("compare", size) as advance:
-            found = diff(baseline, candidate, tolerance or [], conditions, aligned=align, progress=advance)
+            limits, truth = tolerance or [], reference
+            found = diff(baseline, candidate, limits, conditions, reference=truth, aligned=align, progress=advance)
     except ToolkitError as error:
         raise UsageError(str(error)) from error  # 1 means different, so that every error is 2
     if json:
         say_json("diff", found.document)
     else:
         _print(found.document)
+    counts = [channel[name] for channel in found.document["channels"].values() for name in ("same", "changed")]
+    if counts and not any(counts):
+        warn("note: nothing of the one has its like in the other; are they of the same recording?")
     for loss in found.losses:
         warn(f"warning: {loss}")
     if found.losses:

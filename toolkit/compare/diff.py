@@ -1,6 +1,5 @@
 """The diff of two runs: of two recordings with results, or of two landmark databases."""
 
-import filecmp
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -45,12 +44,14 @@ def diff(
     tolerances: Sequence[str] = (),
     conditions: Sequence[Condition] = (),
     *,
+    reference: Path | None = None,
     aligned: bool = False,
     progress: Progress | None = None,
 ) -> Diff:
     """What changed from baseline to candidate. The verdict is about results: manifests may differ, metrics follow.
 
-    `tolerances` are texts `CHANNEL.FIELD=VALUE`; `aligned` moves the candidate's map onto the baseline's.
+    `tolerances` are texts `CHANNEL.FIELD=VALUE`; `reference` has the truth that a side may lack; `aligned` moves the
+    candidate's map onto the baseline's.
 
     Raises:
         ToolkitError: a file cannot be read, they cannot be compared, or a tolerance or condition is wrong.
@@ -63,8 +64,8 @@ def diff(
     if aligned and not databases[0]:
         raise UsageError("--align moves landmark databases; the results of logs are compared as they stand")
     if databases[0]:
-        return _of_maps(baseline, candidate, tolerances, conditions, aligned=aligned)
-    return _of_logs(baseline, candidate, tolerances, conditions, progress)
+        return _of_maps(baseline, candidate, tolerances, conditions, reference, aligned=aligned)
+    return _of_logs(baseline, candidate, tolerances, conditions, reference, progress)
 
 
 def _of_logs(
@@ -72,6 +73,7 @@ def _of_logs(
     candidate: Path,
     tolerances: Sequence[str],
     conditions: Sequence[Condition],
+    reference: Path | None,
     progress: Progress | None,
 ) -> Diff:
     with open_recording(baseline) as mine, open_recording(candidate) as theirs:
@@ -79,11 +81,12 @@ def _of_logs(
         topics = _topics(mine, theirs, limits)
         names = {name: topic.field_names() for name, topic in topics.items()}
         given = asked(tolerances, names)
-        if not conditions and filecmp.cmp(baseline, candidate, shallow=False):
+        if not conditions and _equal_bytes(baseline, candidate):
             return Diff(_document(_counted(mine), identical=True))
         limits.update(_limits(declared(), given, topics))
         compare_messages(mine, theirs, topics, progress)
-        metrics, losses = metric_rows(baseline, candidate, same_recording=mine.fingerprint() == theirs.fingerprint())
+        shared = mine.fingerprint() == theirs.fingerprint()
+        metrics, losses = metric_rows(baseline, candidate, reference, same_recording=shared)
         document = _document(
             {name: topic.diff for name, topic in topics.items()},
             manifest=manifest_rows(mine, theirs),
@@ -95,18 +98,26 @@ def _of_logs(
 
 
 def _of_maps(
-    baseline: Path, candidate: Path, tolerances: Sequence[str], conditions: Sequence[Condition], *, aligned: bool
+    baseline: Path,
+    candidate: Path,
+    tolerances: Sequence[str],
+    conditions: Sequence[Condition],
+    reference: Path | None,
+    *,
+    aligned: bool,
 ) -> Diff:
     ours, given = declared(), asked(tolerances, FIELDS)
     limits = {part: {**ours.get(part, {}), **given.get(part, {})} for part in FIELDS}
     found = diff_maps(read_map(baseline), read_map(candidate), _lookup(limits), aligned=aligned)
+    metrics, losses = metric_rows(baseline, candidate, reference)
     document = _document(
         {"landmarks": found.landmarks, "groups": found.groups},
         manifest=found.manifest,
+        metrics=metrics,
         alignment=alignment_document(found.baseline_from_candidate),
-        identical=filecmp.cmp(baseline, candidate, shallow=False),
+        identical=_equal_bytes(baseline, candidate),
     )
-    return _judged(document, conditions, FIELDS, [])
+    return _judged(document, conditions, FIELDS, losses)
 
 
 def _topics(baseline: Recording, candidate: Recording, limits: Declared) -> dict[str, Topic]:
@@ -162,6 +173,16 @@ def _document(
         "alignment": alignment,
         "conditions": [],
     }
+
+
+def _equal_bytes(baseline: Path, candidate: Path) -> bool:
+    if baseline.stat().st_size != candidate.stat().st_size:
+        return False
+    with baseline.open("rb") as mine, candidate.open("rb") as theirs:
+        while block := mine.read(1 << 20):
+            if block != theirs.read(1 << 20):
+                return False
+    return True
 
 
 def _judged(

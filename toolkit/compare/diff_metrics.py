@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from toolkit.compare.metrics import NOWHERE, Outcome, Reference, evaluate
-from toolkit.compare.read import read_run
+from toolkit.compare.read import read_reference, read_run
 from toolkit.compare.trajectory import interpolated
 from toolkit.errors import RecordingError
 from toolkit.landmarks.model import LandmarkMap, Source
@@ -24,22 +24,28 @@ def metric_names() -> list[str]:
 
 
 def metric_rows(
-    baseline: Path, candidate: Path, *, same_recording: bool
+    baseline: Path, candidate: Path, reference: Path | None = None, *, same_recording: bool = False
 ) -> tuple[dict[str, dict[str, float | None]], list[str]]:
     """The figures of both by name, and what could not be read; no figures unless both have truth and can be evaluated.
 
-    Runs of the same recording may share the truth that one of them has.
+    What truth a side lacks it takes from the other, if they are runs of the same recording, else from `reference`.
+
+    Raises:
+        RecordingError: the reference cannot be read or holds no truth.
     """
+    known, lost = read_reference(reference) if reference else (Reference(), [])
+    losses = [f"{reference}: {loss}" for loss in lost]
     try:
-        (mine, truth, losses), (theirs, other, more) = read_run(baseline), read_run(candidate)
+        (mine, truth, lost), (theirs, other, more) = read_run(baseline), read_run(candidate)
     except RecordingError:  # poses that are not finite, results of other types: the fields tell, figures cannot
-        return {}, []
+        return {}, losses
     if same_recording:
         truth, other = truth.over(other), other.over(truth)
-    losses = [f"{baseline}: {loss}" for loss in losses] + [f"{candidate}: {loss}" for loss in more]
+    truth, other = truth.over(known), other.over(known)
+    losses += [f"{baseline}: {loss}" for loss in lost] + [f"{candidate}: {loss}" for loss in more]
     if any(side.trajectory is None and side.objects is None for side in (truth, other)):
         return {}, losses
-    left, right = (_flat(evaluate(run, known, _PAIRING)) for run, known in ((mine, truth), (theirs, other)))
+    left, right = (_flat(evaluate(run, side, _PAIRING)) for run, side in ((mine, truth), (theirs, other)))
     rows = {}
     for name in {**left, **right}:
         values = left.get(name), right.get(name)
