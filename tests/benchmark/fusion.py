@@ -155,7 +155,8 @@ def tally(log: Path) -> Tally:
         found = {*pairs.values()}
         named |= {truth.ids[i] for i in found}
         missed += sum(
-            truth.ids[i] in named and i not in found and np.hypot(*place) < REACH_M for i, place in enumerate(places)
+            truth.ids[i] in named and i not in found and bool(np.hypot(*place) < REACH_M)
+            for i, place in enumerate(places)
         )
     return Tally(right, wrong, missed)
 

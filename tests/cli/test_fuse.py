@@ -1,5 +1,6 @@
 """The verb fuse: scenes beside what the log has, and what is said where something is missing."""
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from tests.stages.fusion import THREE, boxes, detected, information, mounted, mo
 from toolkit import channels
 from toolkit.cli.main import run
 from toolkit.messages.codec import decode
+from toolkit.messages.images import CameraInfo, CompressedImage
 from toolkit.messages.poses import Odometry, PoseStamped
 from toolkit.messages.transforms import TFMessage, Transform
 from toolkit.recording.reader import open_recording
@@ -131,6 +133,16 @@ def test_extrinsics_come_from_a_file(tmp_path: Path) -> None:
     )
     assert fuse(log, out, "--extrinsics", str(mount)) == 0
     assert scenes(out) == [tuple(NAMES)] * 5
+
+
+def test_of_several_cameras_the_images_own_counts(tmp_path: Path) -> None:
+    behind = dataclasses.replace(information(), intrinsics=np.diag([90.0, 90.0, 1.0]))
+    image = Stamped(channels.CAMERA_IMAGE, START_NS, CompressedImage(START_NS, "camera", "jpeg", b""))
+    found = [Stamped(Channel("/behind/camera_info", CameraInfo), START_NS, behind), *messages()]
+    log, out = write(tmp_path / "log.mcap", [image, *found]), tmp_path / "out.mcap"
+    assert fuse(log, out) == 0
+    assert scenes(out) == [tuple(NAMES)] * 5
+    assert fuse(write(tmp_path / "without.mcap", found), out) == 2
 
 
 def test_sizes_and_classes_are_settings(tmp_path: Path) -> None:
