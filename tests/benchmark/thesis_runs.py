@@ -82,8 +82,8 @@ def call(verb: str, *words: object) -> dict[str, Any]:
 def record(folder: Path, name: str, seed: int, model: list[str]) -> tuple[Path, Path]:
     """The drive `thesis_NAME` of a seed with detections, once with perfect and once with drifting odometry.
 
-    Both are one drive with the same images and scans, since a seed's draws do not depend on each other. As in the
-    thesis, the sensors look at the stops only; odometry runs all the time.
+    Both are one drive with the same images and scans, since a seed's draws do not depend on each other. With perfect
+    odometry the LiDAR looks at the stops only, as in the thesis; with drift its tracks must hold the map together.
     """
     raw, drifting, seen = folder / f"{name}_raw.mcap", folder / f"{name}_odometry.mcap", folder / f"{name}_seen.mcap"
     common = ("--seed", seed, "--workers", 1)
@@ -93,14 +93,14 @@ def record(folder: Path, name: str, seed: int, model: list[str]) -> tuple[Path, 
     stops = stops_of(seen)
     perfect, with_drift = folder / f"{name}.mcap", folder / f"{name}_drift.mcap"
     cut(seen, seen, stops, perfect)
-    cut(seen, drifting, stops, with_drift)
+    cut(seen, drifting, None, with_drift)
     for path in (raw, drifting, seen):
         path.unlink()
     return perfect, with_drift
 
 
-def cut(log: Path, drive: Path, stops: Stops, target: Path) -> None:
-    """Write a log with its scans at the stops only, and with the odometry of a drive."""
+def cut(log: Path, drive: Path, stops: Stops | None, target: Path) -> None:
+    """Write a log with the odometry of a drive, and with its scans at some stops only, where these are given."""
     odometry = {ODOMETRY.topic, TF.topic}
     with open_recording(log) as recording, open_recording(drive) as driven, create_recording(target) as writer:
         kept = [entry.connection for entry in recording.channels if entry.connection.topic not in odometry]
@@ -109,9 +109,12 @@ def cut(log: Path, drive: Path, stops: Stops, target: Path) -> None:
             writer.declare(connection)
         both = recording.messages(kept), driven.messages(taken)
         for raw in heapq.merge(*both, key=attrgetter("log_time_ns")):
-            standing = ((stops[:, 0] <= raw.log_time_ns) & (raw.log_time_ns <= stops[:, 1])).any()
-            if raw.connection.topic != SCAN.topic or standing:
+            if stops is None or raw.connection.topic != SCAN.topic or _within(stops, raw.log_time_ns):
                 writer.write(raw)
+
+
+def _within(stops: Stops, time_ns: int) -> bool:
+    return bool(((stops[:, 0] <= time_ns) & (time_ns <= stops[:, 1])).any())
 
 
 def stops_of(log: Path) -> Stops:
