@@ -16,6 +16,8 @@ RUN = "mcap-landmarks.run"
 """Name of the metadata record that holds the manifest."""
 CONTENT = "content"
 """Entry of the manifest with a hash over the chunks that it was written beside: who edits the file breaks it."""
+LOSSES = "losses"
+"""Entry of the manifest with what of the input could not be read when the output was written."""
 STAGE = "mcap-landmarks.stage"
 """Entry of a channel's metadata that names the stage whose results it holds."""
 RECORDING = "recording"
@@ -71,7 +73,7 @@ class StageRecord:
     def key(self) -> str:
         """SHA-256 of all that decides the results."""
         parts = [self.stage, self.code, self.config, self.resources, self.inputs, self.options]
-        return text_hash(_text(parts))
+        return text_hash(entry_text(parts))
 
     def difference(self, other: "StageRecord") -> str:
         """What decides otherwise here than in an earlier record, in words; empty if nothing does."""
@@ -84,7 +86,7 @@ class StageRecord:
             ("the file ", self.resources, other.resources),
             ("the option ", self.options, other.options),
         ):
-            changed = sorted(name for name in {*new, *old} if _text(new.get(name)) != _text(old.get(name)))
+            changed = sorted(name for name in {*new, *old} if entry_text(new.get(name)) != entry_text(old.get(name)))
             if changed:
                 return f"{what}{', '.join(changed)} changed"
         read = sorted(name for name in {*self.inputs, *other.inputs} if self.inputs.get(name) != other.inputs.get(name))
@@ -147,7 +149,7 @@ class Manifest:
             content["fingerprint"] = self.fingerprint
         if self.stages:
             content["stages"] = {record.stage: record.entry() for record in self.stages}
-        return {key: _text(value) for key, value in content.items()}
+        return {key: entry_text(value) for key, value in content.items()}
 
 
 def stage_records(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, StageRecord]:
@@ -173,18 +175,18 @@ def carried_fingerprint(metadata: Mapping[str, Mapping[str, str]], content: str)
     """
     entries = metadata.get(RUN, {})
     text = entries.get("fingerprint")
-    return str(json.loads(text)) if text and entries.get(CONTENT) == _text(content) else None
+    return str(json.loads(text)) if text and entries.get(CONTENT) == entry_text(content) else None
 
 
-def content_entry(content: str) -> str:
-    """The text of the manifest's entry `CONTENT`."""
-    return _text(content)
+def told_losses(metadata: Mapping[str, Mapping[str, str]]) -> list[str]:
+    """What of its input could not be read when an output was written."""
+    return [str(loss) for loss in json.loads(metadata.get(RUN, {}).get(LOSSES, "[]"))]
 
 
 def narrowed(fingerprint: str, **limits: object) -> str:
     """The fingerprint of a part of a recording; `limits` say which part, those that are None or False do not count."""
     given = {name: limit for name, limit in limits.items() if limit not in (None, False)}
-    return text_hash(_text([fingerprint, given])) if given else fingerprint
+    return text_hash(entry_text([fingerprint, given])) if given else fingerprint
 
 
 @cache
@@ -221,5 +223,6 @@ def file_hash(path: Path, progress: Callable[[int], None] | None = None) -> str:
     return digest.hexdigest()
 
 
-def _text(value: object) -> str:
+def entry_text(value: object) -> str:
+    """The text of one entry of a manifest."""
     return json.dumps(value, sort_keys=True, ensure_ascii=False)

@@ -236,6 +236,17 @@ def test_results_only_are_those_of_the_run(here: Path) -> None:
     assert topics(here / "c.mcap")[SCENE_OBJECTS.topic] == COUNT
 
 
+def test_what_was_lost_is_told_every_time(here: Path) -> None:
+    data = bytearray((here / "log.mcap").read_bytes())
+    data[data.find(b"\xff\xd8\xff") + 20] ^= 1
+    (here / "log.mcap").write_bytes(data)
+    for state in ("ran", "reused"):
+        run = run_stages(asked(here), here / "out.mcap", ["cluster"], "run")
+        assert states(run) == {"cluster": state}
+        assert len(run.losses) == 1
+        assert "CRC" in run.losses[0]
+
+
 def test_where_nothing_may_be_written_the_error_says_so(here: Path) -> None:
     (here / ".out.mcap.parts").write_text("in the way")
     with pytest.raises(RecordingError, match="cannot be made"):

@@ -14,7 +14,7 @@ from zstandard import ZstdCompressor
 
 from toolkit.atomic import atomic_file
 from toolkit.errors import RecordingError
-from toolkit.manifest import CONTENT, RUN, STAGE, content_entry
+from toolkit.manifest import CONTENT, RUN, STAGE, entry_text
 from toolkit.messages.codec import encode
 from toolkit.messages.qos import KEY, qos_profile
 from toolkit.messages.typestore import definition
@@ -175,7 +175,7 @@ class RecordingWriter:
         for group in sorted(self._chunks, key=lambda name: self._chunks[name].start_ns):
             self._flush(self._chunks[group])
         if "fingerprint" in self.metadata.get(RUN, {}):
-            self.metadata[RUN][CONTENT] = content_entry(self._content.hexdigest())
+            self.metadata[RUN][CONTENT] = entry_text(self._content.hexdigest())
         metadata_indexes = []
         for name, entries in sorted(self.metadata.items()):
             data = serialize(records.Metadata(name=name, metadata=dict(sorted(entries.items()))))

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from toolkit.manifest import CONTENT, RUN, STAGE, Manifest, narrowed
+from toolkit.manifest import CONTENT, LOSSES, RUN, STAGE, Manifest, entry_text, narrowed, told_losses
 from toolkit.recording.reader import Recording
 from toolkit.recording.writer import RecordingWriter, create_recording
 from toolkit.runs.bench import Bench, Watch
@@ -12,8 +12,8 @@ from toolkit.runs.view import Layer, View, own_layer
 from toolkit.stage import Connection
 
 
-def assemble(bench: Bench, output: Path, verb: str, inputs: Sequence[str], watch: Watch) -> list[str]:
-    """Write the output, unless it is there already, and tell what the log's losses are and what was left out.
+def assemble(bench: Bench, output: Path, verb: str, inputs: Sequence[str], watch: Watch) -> tuple[list[str], list[str]]:
+    """Write the output, unless it is there already; notes on what was left out, and what of the log is unreadable.
 
     `inputs` are the fingerprints of all recordings that the results were made from.
 
@@ -29,7 +29,7 @@ def assemble(bench: Bench, output: Path, verb: str, inputs: Sequence[str], watch
     metadata = {**source.metadata, RUN: manifest.entries()}
     own = _own(bench, results)
     if not request.force and bench.earlier is not None and _is_there(bench.earlier, metadata, own, results, source):
-        return notes
+        return notes, [*source.losses, *told_losses(bench.earlier.metadata)]
     view = View(source.path, [own, *results])
     span = request.span
     size = view.size_bytes(None, span.start_ns, span.end_ns)
@@ -39,7 +39,9 @@ def assemble(bench: Bench, output: Path, verb: str, inputs: Sequence[str], watch
             writer.write(raw._replace(connection=clean[raw.connection]) if raw.connection in clean else raw)
         for attachment in () if request.results_only else source.attachments():
             writer.attach(attachment)
-    return notes
+        if source.losses:
+            writer.metadata[RUN][LOSSES] = entry_text(source.losses)
+    return notes, list(source.losses)
 
 
 def _own(bench: Bench, results: Sequence[Layer]) -> Layer:
@@ -68,7 +70,8 @@ def _is_there(
     source: Recording,
 ) -> bool:
     """Whether an earlier output holds all that would be written."""
-    found = {**earlier.metadata, RUN: {k: v for k, v in earlier.metadata.get(RUN, {}).items() if k != CONTENT}}
+    own_entries = {k: v for k, v in earlier.metadata.get(RUN, {}).items() if k not in {CONTENT, LOSSES}}
+    found = {**earlier.metadata, RUN: own_entries}
     return (
         earlier.is_ours
         and found == metadata

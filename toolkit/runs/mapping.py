@@ -55,7 +55,6 @@ class MappedLog:
     fingerprint: str
     stages: tuple[StageRun, ...]
     outcome: Outcome
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +102,11 @@ def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
         run = None if task.requests[0].force else _found(task, plans, record, parts)
         if run is None:
             run = _build(stage, config, task, plans, record, parts, watch)
-        for entry in plans:
-            if entry.request.recording in task.outputs:
-                _write_log(task, plans, entry, record, parts, watch)
-    return run
+        written = [
+            _write_log(task, plans, entry, log, record, parts, watch) if log.recording in task.outputs else log
+            for entry, log in zip(plans, run.logs, strict=True)
+        ]
+    return dataclasses.replace(run, logs=tuple(written))
 
 
 def _reduction() -> Reduction:
@@ -147,7 +147,6 @@ def _found(task: MapTask, plans: Sequence[_LogPlan], record: StageRecord, parts:
             entry.fingerprint,
             tuple(StageRun(step.stage.name, "reused", reason, Outcome()) for step in entry.steps),
             outcome,
-            outcome.notes,
         )
         for entry, outcome in zip(plans, outcomes, strict=True)
     )
@@ -180,7 +179,7 @@ def _build(
         notes, losses = told([*runs, StageRun(stage.name, "ran", reason, outcome)], [], [])
         outcome = dataclasses.replace(outcome, losses=losses, notes=notes)
         observations.append(found)
-        logs.append(MappedLog(entry.request.recording, entry.fingerprint, tuple(runs), outcome, notes))
+        logs.append(MappedLog(entry.request.recording, entry.fingerprint, tuple(runs), outcome))
     with watch("solve", None, "steps"):
         prior = read_map(task.prior) if task.prior is not None else None
         landmark_map, trajectories = stage.solve(observations, prior, config)
@@ -238,13 +237,21 @@ def _results(landmark_map: LandmarkMap, trajectory: Trajectory) -> Iterator[Stam
 
 
 def _write_log(
-    task: MapTask, plans: Sequence[_LogPlan], entry: _LogPlan, record: StageRecord, parts: Path, watch: Watch
-) -> None:
-    """One log with all its results."""
-    output = task.outputs[entry.request.recording]
+    task: MapTask,
+    plans: Sequence[_LogPlan],
+    entry: _LogPlan,
+    log: MappedLog,
+    record: StageRecord,
+    parts: Path,
+    watch: Watch,
+) -> MappedLog:
+    """Write one log with all its results; what became of it, with what showed on the way."""
+    output, outcome = task.outputs[log.recording], log.outcome
     with open_bench(entry.request, parts, output) as bench:
         for step in entry.steps:
             if bench.find(step.record) is None:
                 bench.work(step, watch)
         bench.find(_share(entry, record))
-        assemble(bench, output, "map", [other.fingerprint for other in plans], watch)
+        notes, losses = assemble(bench, output, "map", [other.fingerprint for other in plans], watch)
+    notes_told, losses_told = told([StageRun(record.stage, "", "", outcome)], notes, losses)
+    return dataclasses.replace(log, outcome=dataclasses.replace(outcome, notes=notes_told, losses=losses_told))

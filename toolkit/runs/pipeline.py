@@ -52,8 +52,8 @@ def run_stages(
             before = [other for name in names for other in missing_stages(find_stage(name), bench.log)]
             names = in_order([*before, *names])
         runs = [bench.work(step, watch) for step in plan(request, bench.log, names)]
-        notes = assemble(bench, output, verb, [bench.log.recording.fingerprint()], watch)
-        return LogRun(request.recording, output, tuple(runs), *told(runs, notes, bench.log.recording.losses))
+        notes, losses = assemble(bench, output, verb, [bench.log.recording.fingerprint()], watch)
+        return LogRun(request.recording, output, tuple(runs), *told(runs, notes, losses))
 
 
 def told(
