@@ -58,7 +58,8 @@ class StageRecord:
 
     `code` is a hash of the toolkit's sources, `resources` hashes by name. `inputs` names the recording by its
     fingerprint and the stages whose results were read by their keys. `options` are choices beside the configuration:
-    topics, remaps, thinning. Results are the same if, and are reused only if, their keys are equal.
+    topics, remaps, thinning. Results are the same if, and are reused only if, their keys are equal and they are whole:
+    an output of less time than its input carries older results on of which a part `is_cut` off.
     """
 
     stage: str
@@ -68,6 +69,7 @@ class StageRecord:
     inputs: Mapping[str, str]
     options: Mapping[str, object] = field(default_factory=dict)
     outcome: Outcome = field(default_factory=Outcome)
+    is_cut: bool = False
 
     @property
     def key(self) -> str:
@@ -112,6 +114,7 @@ class StageRecord:
             "inputs": dict(self.inputs),
             "options": dict(self.options),
             "outcome": self.outcome.entry(),
+            "is_cut": self.is_cut,
         }
 
 

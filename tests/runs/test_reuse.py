@@ -219,6 +219,15 @@ def test_a_part_of_a_recording_is_not_taken_for_the_whole(here: Path) -> None:
     assert topics(here / "part_out.mcap")["/landmarks/scan_objects"] == 3
 
 
+def test_results_that_were_cut_are_not_taken_for_whole_ones(here: Path) -> None:
+    run_stages(asked(here), here / "whole.mcap", ["detect"], "run")
+    run_stages(asked(here, "whole.mcap", span=Span(end_ns=4 * STEP_NS)), here / "out.mcap", ["cluster"], "run")
+    assert topics(here / "out.mcap")[DETECTIONS.topic] == 3
+    run = run_stages(asked(here), here / "out.mcap", ["detect"], "run")
+    assert reasons(run) == {"detect": "the results in the earlier output are only a part"}
+    assert topics(here / "out.mcap")[DETECTIONS.topic] == COUNT
+
+
 def test_results_alone_are_taken_as_they_are(here: Path) -> None:
     run_stages(asked(here, results_only=True), here / "results.mcap", FRONT, "run")
     assert set(topics(here / "results.mcap")) & {ODOMETRY.topic, "/scan"} == set()

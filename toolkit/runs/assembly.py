@@ -24,7 +24,12 @@ def assemble(bench: Bench, output: Path, verb: str, inputs: Sequence[str], watch
     notes = [f"{name}'s results in the log were made from results that changed; they are left out" for name in stale]
     request, source = bench.request, bench.log.recording
     fingerprint = narrowed(bench.log.fingerprint, results_only=request.results_only)
-    records = tuple(layer.record for layer in results if layer.record is not None)
+    cut = (request.span.start_ns, request.span.end_ns) != (None, None)
+    records = tuple(
+        replace(layer.record, is_cut=layer.record.is_cut or (cut and layer.record.stage not in bench.of_this_run))
+        for layer in results
+        if layer.record is not None
+    )
     manifest = Manifest(verb, inputs=tuple(inputs), options=request.options(), fingerprint=fingerprint, stages=records)
     metadata = {**source.metadata, RUN: manifest.entries()}
     own = _own(bench, results)

@@ -119,14 +119,21 @@ class Bench:
 
     def find(self, record: StageRecord) -> StageRun | None:
         """The results with the key of a record, taken from where they lie; None if they lie nowhere."""
-        part = self._parts / record.file_name
-        unfinished = [("what an unfinished run left", result_layers(self._open(part)))] if part.is_file() else []
-        for place, layers in [*unfinished, *self._stores]:
+        unfinished = self._results_in(self._parts / record.file_name)
+        for place, layers in [("what an unfinished run left", unfinished), *self._stores]:
             layer = layers.get(record.stage)
-            if layer is not None and layer.record is not None and layer.record.key == record.key:
+            known = layer.record if layer is not None else None
+            if layer is not None and known is not None and known.key == record.key and not known.is_cut:
                 self._show({record.stage: layer})
-                return StageRun(record.stage, "reused", f"the same results are in {place}", layer.record.outcome)
+                return StageRun(record.stage, "reused", f"the same results are in {place}", known.outcome)
         return None
+
+    def _results_in(self, path: Path) -> dict[str, Layer]:
+        """The results in a file, none if it is no recording."""
+        if path.is_file():
+            with contextlib.suppress(RecordingError):
+                return result_layers(self._open(path))
+        return {}
 
     def take(self, part: Path) -> None:
         """Show the results in a part to the next stages."""
@@ -174,5 +181,7 @@ class Bench:
         for place, layers in reversed(self._stores):
             layer = layers.get(record.stage)
             if layer is not None and layer.record is not None:
+                if layer.record.is_cut and layer.record.key == record.key:
+                    return f"the results in {place} are only a part"
                 return f"{record.difference(layer.record)} since the results in {place}"
         return "there were no results"
