@@ -10,6 +10,7 @@ from toolkit.messages.images import CameraInfo, CompressedImage, Image
 from toolkit.messages.markers import Marker, MarkerArray, Shape
 from toolkit.messages.match import LandmarkMatch, Status
 from toolkit.messages.numbers import UInt8
+from toolkit.messages.points import PointCloud2
 from toolkit.messages.poses import Odometry, Path, PoseStamped, PoseWithCovarianceStamped
 from toolkit.messages.scan import LaserScan
 from toolkit.messages.scan_objects import ScanObjects
@@ -28,6 +29,7 @@ def vector(*shape: int, elements: st.SearchStrategy[float] = anything) -> st.Sea
 
 
 scan_ranges = st.integers(0, 20).flatmap(lambda n: arrays(np.float32, (n,), elements=st.floats(width=32)))
+cloud_points = st.integers(0, 5).flatmap(lambda n: arrays(np.float32, (n, 3), elements=st.floats(width=32)))
 single = st.floats(width=32, allow_nan=False)
 hypotheses = st.lists(st.tuples(text, number), max_size=3).map(tuple)
 pose_stamped = st.builds(PoseStamped, stamp, text, vector(3), vector(4))
@@ -94,6 +96,7 @@ MESSAGES = st.one_of(
     st.builds(Odometry, stamp, text, text, vector(3), vector(4), vector(6, 6), vector(3), vector(3), vector(6, 6)),
     st.builds(TFMessage, st.lists(transform, max_size=3).map(tuple)),
     st.builds(LaserScan, stamp, text, *[single] * 7, scan_ranges, scan_ranges),
+    st.builds(PointCloud2, stamp, text, cloud_points),
     st.builds(CompressedImage, stamp, text, text, st.binary(max_size=30)),
     st.builds(
         Image, stamp, text, st.integers(0, 9), st.integers(0, 9), text, st.booleans(), st.integers(0, 9), st.binary()

@@ -111,26 +111,27 @@ def sharp(noise: Noise) -> float:
     return noise.sigma_m**2 + SURFACE_M**2
 
 
-def weigh(
-    window: Windows, cells: Cells, shapes: Palette, noise: Noise, passes: int
-) -> tuple[Cells, Array, NDArray[np.int32]]:
+def weigh(window: Windows, cells: Cells, shapes: Palette, noise: Noise, passes: int) -> tuple[Cells, Array, Floats]:
     """The cells at their best distances, the logarithm of their weights, and how many hits these rest on (R, K).
+
+    A hit counts by how much its range changes with that distance: one along the view fully, one across it not at all.
 
     Every pass but the last moves the cells to where their hits are; the last one settles what remains.
     """
     fine, blur = sharp(noise), cells.blur_m2(shapes)
     variance = (fine + blur).astype(np.float32)[:, None, None]
     stray = 2 * np.float32(np.log(_STRAY_RANGE_M / noise.stray)) - np.log(np.float32(2 * np.pi) * variance)
-    hit, ranges = window.is_hit[:, None, :], window.ranges_m[:, None, :]
+    hit, ranges, along = window.is_hit[:, None, :], window.ranges_m[:, None, :], window.directions[:, None, :, 0]
     for left in reversed(range(passes)):
         predicted = _cast(window, cells, shapes)
         off = np.where(hit, ranges - predicted, np.float32(-np.inf))
         used = np.abs(off) < (np.inf if left else _OUTLIER_M)
-        number = np.maximum(used.sum(axis=2, dtype=np.int32), 1)
-        shift = np.where(used, off, np.float32(0)).sum(axis=2) / number.astype(np.float32)
+        number = np.maximum((used * along**2).sum(axis=2), np.float32(1e-3))
+        shift = (np.where(used, off, np.float32(0)) * along).sum(axis=2) / number
         cells = replace(cells, away_m=cells.away_m + shift)
-    squared = np.where(hit, np.minimum((off - shift[..., None]) ** 2 / variance, stray), np.float32(0)).sum(axis=2)
-    missed = ((predicted + shift[..., None] < ranges - np.float32(_CLEAR_M)) & ~hit).sum(axis=2)
+    moved = shift[..., None] * along
+    squared = np.where(hit, np.minimum((off - moved) ** 2 / variance, stray), np.float32(0)).sum(axis=2)
+    missed = ((predicted + moved < ranges - np.float32(_CLEAR_M)) & ~hit).sum(axis=2)
     hits = window.is_hit.sum(axis=1)[:, None]
     log_weights = np.log(noise.dropout) * np.sqrt(fine / (fine + blur))[:, None] * missed - 0.5 * squared
     log_weights += 0.5 * (1 - hits) * np.log(2 * np.pi * (fine + blur))[:, None] - 0.5 * np.log(number)

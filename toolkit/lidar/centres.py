@@ -107,7 +107,14 @@ class _Search:
     def _weigh(self, passes: int) -> None:
         self._cells, self._log_weights, hits = weigh(self._window, self._cells, self._shapes, self._noise, passes)
         rows = self._clusters, self._which
-        _keep(self._found, rows, self._window, self._cells, self._log_weights, sharp(self._noise) / hits)
+        _keep(
+            self._found,
+            rows,
+            self._window,
+            self._cells,
+            self._log_weights,
+            sharp(self._noise) / hits.astype(np.float64),
+        )
 
 
 def _shares(log_weights: Array) -> Array:

@@ -63,15 +63,21 @@ def points_of(beams: Beams, cluster: Cluster) -> Array:
 
 def near_clusters(beams: Beams, found: Sequence[Segment], near_m: float) -> list[Cluster]:
     """Segments as clusters, those together that are no more than `near_m` from one another, whatever lies behind."""
+    if not found:
+        return []
+    hits = [points_of(beams, (segment,)) for segment in found]
+    x, y = np.concatenate(hits).T
+    starts = np.cumsum([0, *(len(points) for points in hits[:-1])])
+    near = (x[:, None] - x) ** 2 + (y[:, None] - y) ** 2 <= near_m**2
+    touching = np.logical_or.reduceat(np.logical_or.reduceat(near, starts, axis=0), starts, axis=1)
     clusters: list[Cluster] = []
-    points: list[Array] = []
-    for segment in found:
-        hits = points_of(beams, (segment,))
-        rows = [i for i, other in enumerate(points) if gap_m(hits, other) <= near_m]
-        cluster: Cluster = (*(one for i in rows for one in clusters[i]), segment)
-        joint = np.concatenate([*(points[i] for i in rows), hits])
-        clusters = [*(one for i, one in enumerate(clusters) if i not in rows), cluster]
-        points = [*(one for i, one in enumerate(points) if i not in rows), joint]
+    left = np.ones(len(found), dtype=np.bool_)
+    while left.any():
+        members = np.arange(len(found)) == np.argmax(left)
+        while (grown := touching[members].any(axis=0)).sum() > members.sum():
+            members = grown
+        left &= ~members
+        clusters.append(tuple(found[i] for i in np.flatnonzero(members).tolist()))
     return clusters
 
 
@@ -96,12 +102,12 @@ def segments(beams: Beams, breaks: Breaks, largest_m: float) -> list[Segment]:
 
     Surfaces end where neighbouring hits are farther apart than any surface explains, and fall into pieces where they
     are farther apart than `link_m`. Of a surface that is too large, such as a wall, only pieces in front of what lies
-    to both their sides remain: something that stands before it.
+    to both their sides remain: something that stands before it. What is seen between two nearer things is left out.
     """
     found = []
     for number in range(len(beams.spacing_rad)):
         for surface in _surfaces(beams, number, breaks):
-            pieces = _pieces(surface, breaks)
+            pieces = [] if surface.is_hidden else _pieces(surface, breaks)
             if surface.size_m <= largest_m:
                 found += [surface.segment(number, *piece) for piece in pieces]
             else:
@@ -115,16 +121,22 @@ def segments(beams: Beams, breaks: Breaks, largest_m: float) -> list[Segment]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Surface:
-    """Hits in a row: their positions in the sweep, points, and ranges."""
+    """Hits in a row: their positions in the sweep, points, and ranges, and those of the beams before and after them."""
 
     places: NDArray[np.int64]
     points_xy: Array
     ranges_m: Array
+    beside_m: tuple[float, float]
 
     @property
     def size_m(self) -> float:
         """The diagonal of the box around the hits: a bound that is cheap for long walls."""
         return float(np.hypot(*np.ptp(self.points_xy, axis=0)))
+
+    @property
+    def is_hidden(self) -> bool:
+        """Whether nearer things stand before both ends: what is seen between them is no more than a part."""
+        return bool(self.beside_m[0] < self.ranges_m[0] and self.beside_m[1] < self.ranges_m[-1])
 
     def segment(self, sweep: int, first: int, last: int) -> Segment:
         """Hits `first` to `last` as a segment."""
@@ -161,7 +173,15 @@ def _surfaces(beams: Beams, number: int, breaks: Breaks) -> Iterator[_Surface]:
         rows = (before + 1 + np.arange(count)) % len(hit)
         places = hit[rows]
         places = places + np.concatenate([[0], np.cumsum(np.diff(places) < 0)]) * (end - start)
-        yield _Surface(places, points[hit[rows]], ranges[hit[rows]])
+        ends_m = (_range_at(beams, number, int(places[0]) - 1), _range_at(beams, number, int(places[-1]) + 1))
+        yield _Surface(places, points[hit[rows]], ranges[hit[rows]], ends_m)
+
+
+def _range_at(beams: Beams, number: int, place: int) -> float:
+    """The range of a beam of a sweep; infinite beyond the ends of one that does not close."""
+    start, count = beams.starts[number], beams.starts[number + 1] - beams.starts[number]
+    known = beams.is_closed[number] or 0 <= place < count
+    return float(beams.ranges_m[start + place % count]) if known else np.inf
 
 
 def _pieces(surface: _Surface, breaks: Breaks) -> list[tuple[int, int]]:

@@ -85,7 +85,8 @@ def windows(beams: Beams, clusters: Sequence[Cluster]) -> Windows:
     points = np.where(is_hit[..., None], beams.points_xy[index], 0.0)
     count = np.maximum(is_hit.sum(axis=1), 1)
     anchors = points.sum(axis=1) / count[:, None]
-    origins = (beams.origins_xy[index] * is_hit[..., None]).sum(axis=1) / count[:, None]
+    # Of two LiDARs on either side the one that has the first hit gives the direction of view.
+    origins = beams.origins_xy[index[np.arange(len(index)), np.argmax(is_hit, axis=1)]]
     bearings = np.arctan2(*(anchors - origins).T[::-1])
     c, s = np.cos(bearings)[:, None], np.sin(bearings)[:, None]
     dx, dy = beams.directions_xy[index, 0], beams.directions_xy[index, 1]
