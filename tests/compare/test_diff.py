@@ -181,14 +181,15 @@ def test_reading_in_parts_changes_nothing(
 
 def test_a_message_that_cannot_be_decoded_is_compared_by_its_bytes(tmp_path: Path) -> None:
     data = [encode(PoseStamped.planar(START_NS + i, "map", [i, 0, 0])) for i in range(5)]
-    for name, third in (("a", data[2]), ("b", data[2][:40])):
+    moved = encode(PoseStamped.planar(START_NS + 3, "map", [7, 0, 0]))
+    for name, changed in (("a", data[2:4]), ("b", [data[2][:40], moved])):
         with create_recording(tmp_path / f"{name}.mcap") as writer:
             connection = writer.connection(channels.POSE)
-            for i, content in enumerate([*data[:2], third, *data[3:]]):
+            for i, content in enumerate([*data[:2], *changed, data[4]]):
                 writer.write(RawMessage(connection, START_NS + i, START_NS + i, i, content))
     channel = diff(tmp_path / "a.mcap", tmp_path / "b.mcap").document["channels"]["/landmarks/pose"]
-    assert counts(channel) == (1, 0, 0)
-    assert set(channel["fields"]) == {"content"}
+    assert counts(channel) == (2, 0, 0)
+    assert set(channel["fields"]) == {"content", "position_m"}
     assert channel["worst"][0]["candidate"].startswith("40 bytes, ")
 
 

@@ -101,7 +101,7 @@ def _print(document: dict[str, Any]) -> None:
 
 
 def _print_rows(head: str, rows: Iterable[tuple[str, dict[str, Any]]]) -> None:
-    lines = [[name, _value(row["baseline"]), _value(row["candidate"])] for name, row in rows]
+    lines = [[_short(name), _value(row["baseline"]), _value(row["candidate"])] for name, row in rows]
     if lines:
         say()
         table([head, "baseline", "candidate"], lines)
@@ -114,7 +114,7 @@ def _print_counts(channels: dict[str, Any]) -> None:
     for name, channel in channels.items():
         rows.append([name, *(str(channel[count]) for count in counts), channel["unit"]])
         messages = channel["messages"]
-        if channel["unit"] != "messages" and (messages["added"] or messages["removed"]):
+        if any(messages[count] != channel[count] for count in ("added", "removed")):
             rows.append(["", *(str(messages[count]) for count in counts), "messages"])
     table(["channel", *counts, "counted"], rows)
 
@@ -189,12 +189,11 @@ def _value(value: Any, field: str = "") -> str:  # noqa: ANN401 - any JSON value
             return _heading(value)
         return _short(", ".join(_value(item) for item in value)) or "none"
     text = _number(value) if isinstance(value, int | float) else str(value)
-    if _HASH.fullmatch(text):
-        return f"{text[:12]}..."
     return _short(text)
 
 
 def _short(text: str) -> str:
+    text = _HASH.sub(lambda found: f"{found[0][:12]}...", text)
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
