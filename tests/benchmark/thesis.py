@@ -3,12 +3,13 @@
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from tests.benchmark.rows import Row, main
 from tests.benchmark.thesis_runs import (
@@ -194,7 +195,7 @@ def _draw(folder: Path, runs: dict[str, Runs]) -> None:
     _save(partial(errors_figure, both, "Figures 5.4 and 5.5"), folder, "5_4", "and_5_5")
 
 
-def _save(draw, folder: Path, number: str, method: str) -> None:  # type: ignore[no-untyped-def] # noqa: ANN001
+def _save(draw: Callable[[], Figure], folder: Path, number: str, method: str) -> None:
     folder.mkdir(exist_ok=True)
     with (folder / f"figure_{number}_{method}.png").open("wb") as stream:
         save(draw, stream, "png")
