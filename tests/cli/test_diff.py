@@ -15,6 +15,7 @@ from toolkit.channels import MAP, POSE, TRUTH_OBJECTS
 from toolkit.cli.console import DONE, USAGE, run_command
 from toolkit.cli.diff import DIFFERENT
 from toolkit.cli.main import build
+from toolkit.compare.diff_maps import moved
 from toolkit.landmarks.database import write_map
 from toolkit.messages.poses import PoseStamped
 from toolkit.resources import resource
@@ -156,6 +157,14 @@ def test_every_error_is_two(logs: tuple[Path, Path], tmp_path: Path, capsys: pyt
     logs[1].write_bytes(logs[1].read_bytes()[:-300])
     assert run(*logs) == USAGE
     assert "was not compared; recover the log first" in capsys.readouterr().err
+
+
+def test_a_note_where_nothing_belongs_together(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_map(tmp_path / "a.db", small_map())
+    write_map(tmp_path / "b.db", moved(small_map(), np.array([100.0, 0, 0])))
+    assert run(tmp_path / "a.db", tmp_path / "b.db") == DIFFERENT
+    assert "nothing of the one has its like in the other; try --align" in capsys.readouterr().err
+    assert run(tmp_path / "a.db", tmp_path / "b.db", "--align") == DONE
 
 
 def test_tolerances(logs: tuple[Path, Path], capsys: pytest.CaptureFixture[str]) -> None:

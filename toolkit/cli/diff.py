@@ -68,7 +68,8 @@ def command(
         _print(found.document)
     counts = [channel[name] for channel in found.document["channels"].values() for name in ("same", "changed")]
     if counts and not any(counts):
-        warn("note: nothing of the one has its like in the other; are they of the same recording?")
+        remedy = "try --align" if "landmarks" in found.document["channels"] else "are they of the same recording?"
+        warn(f"note: nothing of the one has its like in the other; {remedy}")
     for loss in found.losses:
         warn(f"warning: {loss}")
     if found.losses:
