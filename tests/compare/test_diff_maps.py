@@ -12,6 +12,7 @@ from toolkit.compare.diff import diff
 from toolkit.compare.diff_maps import moved
 from toolkit.landmarks.database import write_map
 from toolkit.landmarks.model import Group, LandmarkMap, Source
+from toolkit.manifest import Manifest
 
 MOVE = np.array([4.0, -2.0, 0.7])
 
@@ -100,6 +101,15 @@ def test_alignment_is_a_choice(tmp_path: Path) -> None:
     document = diff(tmp_path / "a.db", tmp_path / "b.db", tolerances, aligned=True).document
     assert document["verdict"] == "same"
     assert document["alignment"]["heading_deg"] == pytest.approx(-np.degrees(0.7))
+
+
+def test_settings_were_meant_to_differ(tmp_path: Path) -> None:
+    for name, sigma_m in (("a.db", 0.05), ("b.db", 0.1)):
+        manifest = Manifest("map", {"build_map": {"range_sigma_m": sigma_m}}).entries()
+        write_map(tmp_path / name, small_map(), manifest)
+    document = diff(tmp_path / "a.db", tmp_path / "b.db").document
+    assert document["verdict"] == "same"
+    assert document["manifest"] == [{"key": "config.build_map.range_sigma_m", "baseline": 0.05, "candidate": 0.1}]
 
 
 def test_sources_were_meant_to_differ(tmp_path: Path) -> None:

@@ -17,7 +17,8 @@ from toolkit.compare.diff_tolerances import Declared, asked, declared
 from toolkit.compare.metrics import alignment_document
 from toolkit.compare.read import is_database
 from toolkit.errors import UsageError
-from toolkit.landmarks.database import read_map
+from toolkit.landmarks.database import read_manifest, read_map
+from toolkit.manifest import RUN
 from toolkit.messages.annotations import ImageAnnotations
 from toolkit.recording.blocks import Progress
 from toolkit.recording.reader import Recording, open_recording
@@ -89,7 +90,7 @@ def _of_logs(
         metrics, losses = metric_rows(baseline, candidate, reference, same_recording=shared)
         document = _document(
             {name: topic.diff for name, topic in topics.items()},
-            manifest=manifest_rows(mine, theirs),
+            manifest=manifest_rows(*(recording.metadata.get(RUN, {}) for recording in (mine, theirs))),
             structure=structure_rows(mine, theirs),
             metrics=metrics,
         )
@@ -112,7 +113,7 @@ def _of_maps(
     metrics, losses = metric_rows(baseline, candidate, reference)
     document = _document(
         {"landmarks": found.landmarks, "groups": found.groups},
-        manifest=found.manifest,
+        manifest=[*found.manifest, *manifest_rows(read_manifest(baseline), read_manifest(candidate))],
         metrics=metrics,
         alignment=alignment_document(found.baseline_from_candidate),
         identical=_equal_bytes(baseline, candidate),

@@ -12,12 +12,12 @@ from toolkit.recording.reader import Recording
 from toolkit.stage import Connection
 
 Row = dict[str, Any]
-_FOLLOWS = re.compile(r"content|stages\.[^.]*\.(key|outcome|inputs|resources|code)(\..*)?")
+_FOLLOWS = re.compile(r"content|options\.logs|stages\.[^.]*\.(key|outcome|inputs|resources|code)(\..*)?")
 
 
-def manifest_rows(baseline: Recording, candidate: Recording) -> list[Row]:
+def manifest_rows(baseline: Mapping[str, str], candidate: Mapping[str, str]) -> list[Row]:
     """What was meant to differ: each entry of the manifests that does, but for those that follow from others."""
-    rows = rows_of(*(_entries(recording.metadata.get(RUN, {})) for recording in (baseline, candidate)))
+    rows = rows_of(_entries(baseline), _entries(candidate))
     return [row for row in rows if not _FOLLOWS.fullmatch(row["key"])]
 
 
