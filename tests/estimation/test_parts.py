@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from tests.estimation.worlds import Array
 from toolkit.estimation import closed_form, robust
+from toolkit.estimation.odometry import Motions, OdometryNoise, motion_covariance
 from toolkit.estimation.sightings import points_from_polar, polar_from_points
 from toolkit.estimation.symmetric import Symmetric3, Vector3, factor3, inverse2, inverse3, solve3
 from toolkit.estimation.thesis import solve_position
@@ -102,3 +103,10 @@ def test_the_thesiss_solver_finds_the_position_or_its_mirror_image() -> None:
     ranges = np.linalg.norm(landmarks - position, axis=1)
     np.testing.assert_allclose(solve_position(landmarks, ranges, (4.0, 2.0)), position, atol=1e-6)
     assert solve_position(landmarks, ranges, (4.0, -2.0))[1] < -2.9
+
+
+def test_a_robot_that_stands_for_long_stays_where_it_is() -> None:
+    still = Motions(np.zeros((5000, 3)), np.zeros(5000), np.zeros(5000))
+    covariances = motion_covariance(still, OdometryNoise())
+    assert (np.linalg.eigvalsh(covariances) > 0).all()
+    assert np.sqrt(covariances.sum(axis=0).diagonal()).max() < 1e-3

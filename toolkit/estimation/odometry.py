@@ -9,8 +9,8 @@ from toolkit.geometry.angles import wrap
 
 Array = NDArray[np.float64]
 
-# Standing still is never known better than this (m, rad).
-_FLOOR_M, _FLOOR_RAD = 1e-3, 1e-3
+# Standing still is never known better than this (m, rad); it adds up over all bundles while a robot stands.
+_FLOOR_M, _FLOOR_RAD = 1e-5, 1e-5
 # Wheels roll further off than they slip: variance sideways over variance forwards.
 _SIDEWAYS = 0.25
 
