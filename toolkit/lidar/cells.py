@@ -11,7 +11,7 @@ from toolkit.lidar.windows import Windows
 
 SURFACE_M = 0.002
 """How far real outlines are off their shapes."""
-_KEPT = 24
+_KEPT = 16
 _CLEAR_M = 0.05
 """A beam that ends no more than this behind a surface may have met it."""
 _STRAY_RANGE_M = 0.5
@@ -61,17 +61,17 @@ class Cells:
 def first_cells(window: Windows, shapes: Palette) -> Cells:
     """A coarse grid of all that the outermost hits allow; either all shapes are round or none."""
     is_round, sized = bool((shapes.turn_rad == 0).all()), shapes.span_m > 0
-    fixed = _grid(24, 1, 1) if is_round else _grid(10, 20, 1)
-    x, t, s = np.where(sized[:, None, None], _grid(10, 10, 2) if sized.any() else fixed, fixed).swapaxes(0, 1)
+    fixed = _grid(24, 1, 1) if is_round else _grid(8, 16, 1)
+    x, t, s = np.where(sized[:, None, None], _grid(8, 8, 2) if sized.any() else fixed, fixed).swapaxes(0, 1)
     low, high = window.lateral_m[:, 1] - shapes.reach_m, window.lateral_m[:, 0] + shapes.reach_m
     low, high = np.minimum(low, high) - SURFACE_M, np.maximum(low, high) + SURFACE_M
-    half_turn = shapes.turn_rad / (2 if is_round else np.where(sized, 20, 40))
+    half_turn = shapes.turn_rad / (2 if is_round else np.where(sized, 16, 32))
     parts: tuple[Array, ...] = (
         np.broadcast_to(0.7 * shapes.reach_m[:, None], x.shape),
         low[:, None] + (high - low)[:, None] * x,
         shapes.turn_rad[:, None] * t,
         s,
-        (high - low) / (48 if is_round else 20),
+        (high - low) / (48 if is_round else 16),
         half_turn,
         np.where(sized, 0.25, 0.5),
     )

@@ -12,8 +12,10 @@ from toolkit.lidar.palette import Palette, palette
 from toolkit.lidar.shapes import Shape
 from toolkit.lidar.windows import Windows
 
-_ENOUGH = 10.0
-"""A posterior that spreads over so many cells of the grid is fine enough."""
+_ENOUGH, _MANY = 5.0, 12.0
+"""A posterior that spreads over so many cells of the grid is fine enough, over many even where these are coarse."""
+_BLURRED = 8.0
+"""A grid is too coarse where its cells add so much more to the variance of a hit."""
 _LEVELS = 3
 _HOPELESS = 12.0
 """A shape whose evidence is lower than another's by this logarithm needs no better place."""
@@ -95,7 +97,9 @@ class _Search:
         known = self._found.log_evidence[self._clusters, self._which]
         hopeful = known + 0.5 * hits * blur >= least[self._clusters]
         for _ in range(_LEVELS):
-            again = np.flatnonzero(hopeful & (1 / (_shares(self._log_weights) ** 2).sum(axis=1) < _ENOUGH))
+            cells = 1 / (_shares(self._log_weights) ** 2).sum(axis=1)
+            blurred = self._cells.blur_m2(self._shapes) > _BLURRED * sharp(self._noise)
+            again = np.flatnonzero(hopeful & (cells < np.where(blurred, _MANY, _ENOUGH)))
             if not len(again):
                 return
             self._clusters, self._which = self._clusters[again], self._which[again]

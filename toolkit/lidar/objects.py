@@ -22,6 +22,8 @@ _CRACK_M = 0.35
 """Segments that are no farther apart can be of one solid thing, whose hits between them were lost."""
 _LOG_PER_M2 = -3.0
 """Logarithm of objects per square metre where there are any: two side by side are less likely than one of two parts."""
+_FAR_M, _SURELY = 0.45, 4.0
+"""Clusters farther apart become one only where the logarithm of the evidence gains more than this, not just any."""
 _UNKNOWN_M = 0.5
 """Hits of something of no known shape lie anywhere within so many metres along the view."""
 
@@ -55,11 +57,12 @@ class _Explained:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Pair:
-    """Two clusters that could be one, the joint one, and which shapes (S,) could be of such two."""
+    """Two clusters that could be one, the joint one, their distance, and which shapes (S,) could be of such two."""
 
     first: Cluster
     second: Cluster
     both: Cluster
+    gap_m: float
     shapes: NDArray[np.bool_]
 
 
@@ -193,7 +196,7 @@ def _joined(beams: Beams, given: Sequence[Cluster], explain: _Explainer) -> list
         found = [one.total for one in explain(clusters, pairs)]
         alone = dict(zip(clusters, found, strict=False))
         gains = [
-            joint - alone[pair.first] - alone[pair.second]
+            joint - alone[pair.first] - alone[pair.second] - (_SURELY if pair.gap_m > _FAR_M else 0.0)
             for pair, joint in zip(pairs, found[len(clusters) :], strict=True)
         ]
         best = int(np.argmax(gains)) if gains else -1
@@ -220,7 +223,7 @@ def _pairs(clusters: Sequence[Cluster], points: Mapping[Cluster, Array], explain
         shapes = explain.bridging(gap, (2 * radii[i], 2 * radii[j]), _is_one_view(first, second))
         if shapes.any():
             both = tuple(sorted((*first, *second), key=lambda one: (one.sweep, one.first)))
-            found.append(_Pair(first, second, both, shapes))
+            found.append(_Pair(first, second, both, gap, shapes))
     return found
 
 
