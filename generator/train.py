@@ -23,8 +23,8 @@ app = typer.Typer(
     help=__doc__
     + """
 
-The bundled model, from nothing: `pictures DIR`, `fit DIR RUN`, `judge RUN`, `export RUN MODEL.onnx --confidence C`
-with the threshold that `judge` shows to be best, and `python -m tests.benchmark.detector` for the figures of its card.
+The bundled model, from nothing: `pictures DIR`, `fit DIR RUN`, `judge RUN`, `export RUN MODEL.onnx --confidence CLASS=SCORE`
+with the thresholds that `judge` shows to be best, and `python -m tests.benchmark.detector` for the figures of its card.
 
 `pictures` takes 10 minutes on two cores and 3.5 GB, `fit` about two hours there (`--device cuda`: minutes); both go on
 where they were stopped. Where something else uses the cores, OMP_WAIT_POLICY=PASSIVE GOMP_SPINCOUNT=0 keeps `fit` from
@@ -123,14 +123,14 @@ def _developed(kind: Kind, count: int) -> Iterator[Picture]:
 def export(
     run: Run,
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="ONNX file to write.")],
-    confidence: Annotated[float, typer.Option(help="Score threshold that the file recommends.")] = 0.4,
+    confidence: Annotated[list[str], typer.Option(help="Threshold that the file recommends: CLASS=SCORE, for each.")],
     commit: Annotated[str, typer.Option(help="Commit of this code, for the record.")] = "",
 ) -> None:
     """Write the averaged network as ONNX, with names, stride, threshold and provenance in its metadata."""
     trained = fitting.trained(run / fitting.LAST, torch.device("cpu"))
     data = json.loads((run / "pictures.json").read_text(encoding="utf-8"))
     about = {
-        "confidence": str(confidence),
+        "confidence": json.dumps({name: float(score) for name, _, score in (one.partition("=") for one in confidence)}),
         "producer": "mcap-landmarks generator.train",
         "commit": commit,
         "seed": str(trained.recipe.seed),

@@ -32,6 +32,7 @@ from toolkit.vision.session import open_session
 SEED = 10_000
 VIEWS = 8
 LEAST_SCORE = 0.01
+SHIPPED = 1.0
 NEAR_TO_FAR_M = ((2.0, 8.0), (8.0, 12.0), (12.0, 15.0))
 FINE_M = (2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 15.0)
 IMAGES: dict[Kind, int] = {"thesis": 1200, "twelve": 800, "empty": 800}
@@ -43,25 +44,29 @@ class Detector:
     def __init__(self) -> None:
         self._session = open_session(resources.detector())
         self._contract = read_contract(self._session, None, "yolov5")
-        shipped = self._contract.confidence
-        (self.threshold,) = set(shipped.values())
+        self.thresholds = self._contract.confidence
+        names = self._contract.names
+        self._shipped = np.array([self.thresholds.get(name, 1.0) for name in names])
         self._config = DetectConfig(confidence=LEAST_SCORE)
         self._above = thresholds(self._contract, self._config)
 
     def find(self, image: NDArray[np.uint8]) -> Found:
-        """What it finds, down to scores far below its threshold, so that precision has a curve."""
+        """What it finds, down to scores far below its thresholds, so that precision has a curve.
+
+        Scores are in units of their class's threshold: `SHIPPED` is where the stage cuts.
+        """
         size = (image.shape[0], image.shape[1])
         input_px = input_size(self._contract, size, self._config)
         letterbox = fit(size, input_px)
         outputs = self._session.run(tensor(image, letterbox, input_px, self._contract.dtype))
         found = decode(outputs, letterbox, input_px, self._contract, self._above, self._config)
-        return Found(found.boxes_xyxy, found.scores.astype(float), found.class_ids.astype(np.int64))
+        scores = found.scores.astype(float) / self._shipped[found.class_ids]
+        return Found(found.boxes_xyxy, scores, found.class_ids.astype(np.int64))
 
 
 def measure(quick: bool) -> Iterator[Row]:
     """The rows of step 3 about what is found; worlds, looks and places that no training saw."""
     detector = Detector()
-    at = detector.threshold
     results: dict[Kind, tuple[list[Found], list[Picture]]] = {}
     for kind, images in IMAGES.items():
         shown = list(_worlds(kind, images // 8 if quick else images))
@@ -73,19 +78,19 @@ def measure(quick: bool) -> Iterator[Row]:
     yield _mean_precision("map50_thesis", by_class, THESIS_CLASSES, 0.95)
     for (near, far), goal in zip(NEAR_TO_FAR_M, (0.98, 0.93, 0.85), strict=True):
         cases = int(((thesis.distances_m >= near) & (thesis.distances_m < far)).sum())
-        by_kind = {name: by_class[name].recall(at, near, far) for name in THESIS_CLASSES}
-        value = thesis.recall(at, near, far)
+        by_kind = {name: by_class[name].recall(SHIPPED, near, far) for name in THESIS_CLASSES}
+        value = thesis.recall(SHIPPED, near, far)
         yield Row(f"recall_{near:g}_{far:g}", value, at_least=goal, cases=cases, peers=by_kind)
     empty, _ = results["empty"]
-    false = [bool((one.scores > at).any()) for one in empty]
-    yield Row("false_images", float(np.mean(false)), at_most=0.02, cases=len(false), peers={"threshold": at})
+    false = [bool((one.scores > SHIPPED).any()) for one in empty]
+    yield Row("false_images", float(np.mean(false)), at_most=0.02, cases=len(false), peers=dict(detector.thresholds))
     everything = joined(list(by_class.values()))
-    yield Row("precision", everything.precision(at), at_least=0.97, cases=int((everything.scores > at).sum()))
+    yield Row("precision", everything.precision(SHIPPED), at_least=0.97, cases=int((everything.scores > SHIPPED).sum()))
     found_12, shown_12 = results["twelve"]
     labels_12 = [picture.labels for picture in shown_12]
     of_twelve = {name: score(found_12, labels_12, COCO_ID[name]) for name in COCO_ID}
     yield _mean_precision("map50_12", of_twelve, tuple(COCO_ID), None)
-    yield _bearing_error(found, shown, at)
+    yield _bearing_error(found, shown)
     yield from small_log()
 
 
@@ -109,7 +114,7 @@ def _mean_precision(name: str, by_class: dict[str, Scored], names: Sequence[str]
     return Row(name, float(np.mean(list(values.values()))), at_least=goal, cases=cases, peers=values)
 
 
-def _bearing_error(found: Sequence[Found], shown: Sequence[Picture], at: float) -> Row:
+def _bearing_error(found: Sequence[Found], shown: Sequence[Picture]) -> Row:
     """Median of the angle between a box's centre column and the object's centre; all of it visible, by distance."""
     focal_px, middle_px = Intrinsics.of(CameraSpec()).focal_px, CameraSpec().width_px / 2
     thesis_ids = [COCO_ID[name] for name in THESIS_CLASSES]
@@ -117,7 +122,7 @@ def _bearing_error(found: Sequence[Found], shown: Sequence[Picture], at: float) 
     for one, picture in zip(found, shown, strict=True):
         labels = picture.labels
         overlap = iou(one.boxes_xyxy, labels.boxes_xyxy) * (one.classes[:, None] == labels.classes)
-        overlap[one.scores <= at] = 0
+        overlap[one.scores <= SHIPPED] = 0
         for index in np.flatnonzero((labels.shares > 0.95) & np.isin(labels.classes, thesis_ids)):
             best = int(overlap[:, index].argmax()) if len(overlap) else 0
             if len(overlap) and overlap[best, index] > 0.5:

@@ -1,4 +1,4 @@
-"""The detection stage's speed against the bare network, and the network's by size."""
+"""The detection stage's speed against the bare network, the network's by size, and what the bundled one finds."""
 
 import sys
 import tempfile
@@ -13,6 +13,7 @@ import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 
+from tests.benchmark import detections
 from tests.benchmark.rows import Row, main
 from tests.vision.networks import SIZES, Export, yolov5
 from toolkit.channels import CAMERA_IMAGE
@@ -32,10 +33,11 @@ RATE_NS = 33_333_333
 
 
 def measure(quick: bool) -> Iterator[Row]:
-    """The rows of step 3 that need no trained model."""
+    """Speed with untrained networks of every size, then what the bundled one finds."""
     with tempfile.TemporaryDirectory() as folder:
         yield from _throughput(Path(folder), images=60 if quick else 200, rounds=3 if quick else 7)
         yield from _latency(Path(folder), rounds=3 if quick else 10)
+    yield from detections.measure(quick)
 
 
 def _picture(rng: np.random.Generator) -> NDArray[np.uint8]:
