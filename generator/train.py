@@ -23,8 +23,8 @@ app = typer.Typer(
     help=__doc__
     + """
 
-The bundled model, from nothing: `pictures DIR`, `fit DIR RUN`, `judge RUN`, `export RUN MODEL.onnx --confidence CLASS=SCORE`
-with the thresholds that `judge` shows to be best, and `python -m tests.benchmark.detector` for the figures of its card.
+The bundled model, from nothing: `pictures DIR`, `fit DIR RUN`, `judge RUN`, `export RUN MODEL.onnx --confidence
+CLASS=SCORE` for each class, and `python -m tests.benchmark.detector` for the figures of its card.
 
 `pictures` takes 10 minutes on two cores and 3.5 GB, `fit` about two hours there (`--device cuda`: minutes); both go on
 where they were stopped. Where something else uses the cores, OMP_WAIT_POLICY=PASSIVE GOMP_SPINCOUNT=0 keeps `fit` from

@@ -13,7 +13,7 @@ from toolkit.cli.main import build
 from toolkit.resources import resource
 
 GOLDEN = Path(__file__).parent
-START_NS = 1_700_000_000 * 10**9
+START_NS = 1_767_225_600 * 10**9
 Make = Callable[[Path], None]
 
 
@@ -26,17 +26,17 @@ def span(seconds: int) -> tuple[str, ...]:
 
 
 def make_map(folder: Path) -> None:
-    """A map of the first minute, and the path that was driven meanwhile."""
+    """A map of the first twenty seconds, from pixels, and the path that was driven meanwhile."""
     log = resource("recordings", "demo_map.mcap")
-    assert run("map", log, "--map", folder / "map.db", "-o", folder / "map.mcap", "--results-only", *span(60)) == DONE
+    assert run("map", log, "--map", folder / "map.db", "-o", folder / "map.mcap", "--results-only", *span(20)) == DONE
 
 
 def make_localize(folder: Path) -> None:
-    """Forty seconds in the surveyed map, with the truth beside them."""
+    """Ten seconds in the surveyed map, from pixels, with the truth beside them."""
     log = resource("recordings", "demo_localize.mcap")
     assert run("map", log, "--map", folder / "surveyed.db", "--from-reference") == DONE
     where = "--map", folder / "surveyed.db", "-o", folder / "localize.mcap", "--results-only"
-    assert run("localize", log, *where, *span(40)) == DONE
+    assert run("localize", log, *where, *span(10)) == DONE
 
 
 @pytest.mark.parametrize(

@@ -161,13 +161,13 @@ class Fuser:
                 told = tuple((name, share) for name, share in options if share >= _LEAST_TOLD)
                 found.append((options[0][1], i, told))
         kept: list[tuple[int, tuple[tuple[str, float], ...], Array, Array, float]] = []
-        for _, i, options in sorted(found, key=lambda entry: (-entry[0], entry[1])):
-            name = options[0][0]
+        for _, i, told in sorted(found, key=lambda entry: (-entry[0], entry[1])):
+            name = told[0][0]
             centres = self._centres(objects, name)
             position, radius = centres.positions_xy[i], self._radius(objects.ids[i], name)
             same = [entry for entry in kept if entry[1][0][0] == name]
             if all(np.hypot(*(position - other[2])) > radius for other in same):
-                kept.append((i, options, position, centres.covariances[i], radius))
+                kept.append((i, told, position, centres.covariances[i], radius))
         kept.sort(key=lambda entry: entry[0])
         return SceneObjects(
             objects.stamp_ns,
