@@ -46,7 +46,7 @@ def evos(estimate: Trajectory, reference: Trajectory, *, aligned: bool, within_n
         seconds = trajectory.time_ns // 10**9 + (trajectory.time_ns % 10**9) * 1e-9  # as evo reads a header's stamp
         return PoseTrajectory3D(positions, quaternion[:, [3, 0, 1, 2]], seconds)
 
-    ref, est = sync.associate_trajectories(to_evo(reference), to_evo(estimate), within_ns / 1e9)
+    ref, est = sync.associate_trajectories(to_evo(reference), to_evo(estimate), max_diff=within_ns / 1e9)
     if aligned:
         est.align(ref)
     figures = []
