@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
@@ -16,50 +15,40 @@ from numpy.typing import NDArray
 from tests.benchmark import detections
 from tests.benchmark.rows import Row, main
 from tests.vision.networks import SIZES, Export, yolov5
+from toolkit import resources
 from toolkit.channels import CAMERA_IMAGE
+from toolkit.messages.codec import decode
 from toolkit.messages.images import CompressedImage
-from toolkit.recording.writer import create_recording
+from toolkit.recording.reader import open_recording
 from toolkit.runs.pipeline import run_stages
 from toolkit.runs.plan import Request
-from toolkit.stage import Stamped
 from toolkit.vision.letterbox import fit, tensor
+from toolkit.vision.pixels import rgb_from_message
 from toolkit.vision.session import open_session
 
 NAMES = [f"class {i}" for i in range(80)]
 INPUT_PX = (480, 640)
 THESIS_CPU_MS = {"n": 45.0, "s": 98.0, "m": 224.0, "l": 430.0, "x": 766.0}
 """Milliseconds per image of 640 x 640 that the thesis gives for its CPU."""
-RATE_NS = 33_333_333
 
 
 def measure(quick: bool) -> Iterator[Row]:
     """Speed with untrained networks of every size, then what the bundled one finds."""
     with tempfile.TemporaryDirectory() as folder:
-        yield from _throughput(Path(folder), images=60 if quick else 200, rounds=3 if quick else 7)
+        yield from _throughput(Path(folder), rounds=3 if quick else 7)
         yield from _latency(Path(folder), rounds=3 if quick else 10)
     yield from detections.measure(quick)
 
 
-def _picture(rng: np.random.Generator) -> NDArray[np.uint8]:
-    """Soft shapes with grain: about as hard to decode as a camera's image."""
-    coarse = rng.integers(0, 256, (12, 16, 3), dtype=np.uint8)
-    smooth = cv2.resize(coarse, INPUT_PX[::-1], interpolation=cv2.INTER_CUBIC).astype(np.int16)
-    return np.clip(smooth + rng.normal(0, 4, smooth.shape), 0, 255).astype(np.uint8)
-
-
-def _throughput(folder: Path, images: int, rounds: int) -> Iterator[Row]:
-    """Images per second: a log read, detected and written, over `session.run` on the same tensors, in turns."""
-    model, log = folder / "n.onnx", folder / "log.mcap"
-    yolov5(model, NAMES, "n", Export("h", "w", objectness_bias=-5.0))
-    rng, tensors = np.random.default_rng(0), []
-    with create_recording(log) as writer:
-        for i in range(images):
-            picture = _picture(rng)
-            data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, 90])[1].tobytes()
-            writer.add(Stamped(CAMERA_IMAGE, i * RATE_NS + 1, CompressedImage(i * RATE_NS + 1, "camera", "jpeg", data)))
-            tensors.append(tensor(picture, fit(INPUT_PX, INPUT_PX), INPUT_PX, np.dtype(np.float32)))
+def _throughput(folder: Path, rounds: int) -> Iterator[Row]:
+    """Images per second: the demo's log read, detected and written, over `session.run` on the same tensors."""
+    log, tensors = resources.resource("recordings", "demo_map.mcap"), []
+    with open_recording(log) as recording:
+        for raw in recording.messages(recording.connections(CAMERA_IMAGE.topic)):
+            rgb = rgb_from_message(decode(CompressedImage, raw.data))
+            tensors.append(tensor(rgb, fit(INPUT_PX, INPUT_PX), INPUT_PX, np.dtype(np.float32)))
     for name, threads in (("throughput", 0), ("throughput_1_thread", 1)):
-        yield _against_bare(name, threads, (model, log, folder / "out.mcap"), tensors, rounds)
+        yield _against_bare(name, threads, (resources.detector(), log, folder / "out.mcap"), tensors, rounds)
 
 
 def _against_bare(

@@ -194,12 +194,19 @@ def test_many_logs(tmp_path: Path, model: Path, capsys: pytest.CaptureFixture[st
     assert len(document["logs"]) == 2
 
 
+def test_without_a_model_the_bundled_one_looks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, out = write(tmp_path / "log.mcap", images()), tmp_path / "out.mcap"
+    assert call("detect", log, "-o", out, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["images"] > 0
+    assert call("detect", log, "-o", out, "--set", "detect.classes=['unicorn']") == 2
+    assert "detector.onnx detects no unicorn" in capsys.readouterr().err
+
+
 def test_refusals(tmp_path: Path, model: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, out = write(tmp_path / "log.mcap", images()), tmp_path / "out.mcap"
     other = answering(tmp_path / "other.onnx", {"output0": np.zeros((1, 84, 84), np.float32)}, {"names": "['a']"})
     blind = write(tmp_path / "blind.mcap", [info(CAMERA_INFO.topic)])
     for code, said, words in (
-        (2, "needs a model and none is bundled; give --model FILE", (log,)),
         (1, "no.onnx: cannot be read", (log, "--model", tmp_path / "no.onnx")),
         (1, "expected one input [1, 3, 64, 64]", (log, "--model", other)),
         (1, "no image (sensor_msgs/msg/CompressedImage or sensor_msgs/msg/Image)", (blind, "--model", model)),

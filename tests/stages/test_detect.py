@@ -202,9 +202,9 @@ def test_steps_overlap_and_memory_is_bounded() -> None:
             both.wait()  # only if 1 is being prepared while 0 is worked on
         return -item
 
-    for position, (item, result) in enumerate(in_order(items(), prepare, work)):
+    for position, (item, result) in enumerate(in_order(items(), prepare, work, at_once=2)):
         assert (item, result) == (position, -position)
-        assert drawn <= position + AHEAD + 1
+        assert drawn <= position + 2 + AHEAD + 1
 
 
 def test_errors_in_a_thread_come_out() -> None:

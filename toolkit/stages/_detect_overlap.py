@@ -9,26 +9,26 @@ Item = TypeVar("Item")
 Prepared = TypeVar("Prepared")
 Result = TypeVar("Result")
 
-AHEAD = 4
-"""Items under way at once: enough to keep the slowest step busy, few enough to bound memory."""
+AHEAD = 3
+"""Items under way beside those that are run: enough to keep the slowest step busy, few enough to bound memory."""
 
 
 def in_order(
-    items: Iterable[Item], prepare: Callable[[Item], Prepared], run: Callable[[Prepared], Result]
+    items: Iterable[Item], prepare: Callable[[Item], Prepared], run: Callable[[Prepared], Result], at_once: int = 1
 ) -> Iterator[tuple[Item, Result]]:
     """Every item with `run(prepare(item))`; what either raises is raised when the item's turn comes.
 
-    Items are drawn and results taken in the caller's thread, so both may do I/O; `run` is never called twice at once.
+    Items are drawn and results taken in the caller's thread, so both may do I/O; `at_once` calls of `run` overlap.
     """
     under_way: deque[tuple[Item, Future[Result]]] = deque()
-    with ThreadPoolExecutor(2) as preparing, ThreadPoolExecutor(1) as running:
+    with ThreadPoolExecutor(1) as preparing, ThreadPoolExecutor(at_once) as running:
 
         def finish(prepared: "Future[Prepared]") -> Result:
             return run(prepared.result())
 
         for item in items:
             under_way.append((item, running.submit(finish, preparing.submit(prepare, item))))
-            while under_way and (len(under_way) >= AHEAD or under_way[0][1].done()):
+            while under_way and (len(under_way) >= at_once + AHEAD or under_way[0][1].done()):
                 first, future = under_way.popleft()
                 yield first, future.result()
         while under_way:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import difflib
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -43,11 +44,11 @@ class DetectConfig:
     class name. Boxes of one class that overlap by more than `iou` are one, and an image has at most `max_detections`.
     `classes`: the only ones that are kept, all if empty. Where the model leaves its input free, an image's longer side
     becomes `size_px`, and `shape` says whether the input is as small as the image allows or a square. `anchors` count
-    for models of raw heads whose metadata have none. `provider` runs the network, on the CPU with so many `threads`
-    (0: one per core). A second-stage classifier, where one is given, can veto or relabel (`classifier_action`) a box
-    for whose label it has another with a probability of `classifier_confidence`; it sees colours of 0 to 1 less
-    `classifier_mean`, divided by `classifier_std`. The thesis (Algorithm 1) has a square of 640, a threshold of 0.25,
-    no class filter, and a classifier whose objection is always a veto.
+    for models of raw heads whose metadata have none. `provider` runs the network, on the CPU in so many `threads`
+    (0: one per core), each with an image of its own. A second-stage classifier, where one is given, can veto or relabel
+    (`classifier_action`) a box for whose label it has another with a probability of `classifier_confidence`; it sees
+    colours of 0 to 1 less `classifier_mean`, divided by `classifier_std`. The thesis (Algorithm 1) has a square of 640,
+    a threshold of 0.25, no class filter, and a classifier whose objection is always a veto.
     """
 
     method: Literal["default", "thesis"] = "default"
@@ -134,7 +135,8 @@ def process(
     """
     if config.method == "thesis":
         config = _as_in_the_thesis(config)
-    session = open_session(resources["model"], config.provider, config.threads)
+    # Each image on a thread of its own: nothing waits for the slowest part of a layer, and none runs idle.
+    session = open_session(resources["model"], config.provider, threads=1)
     contract = read_contract(session, resources.get("names"), config.anchors)
     if config.method == "thesis" and not {*contract.input_px} <= {None, _THESIS_SIZE_PX}:
         raise UsageError(f"{contract.path}: the thesis's method has an input of 640 x 640; export the model with that")
@@ -143,7 +145,7 @@ def process(
     read = failed = 0
     error: MessageError | None = None
     prepare, run = partial(_prepare, contract=contract, config=config), partial(_run, session=session)
-    for bundle, result in in_order(bundles, prepare, run):
+    for bundle, result in in_order(bundles, prepare, run, _at_once(config)):
         read += 1
         if isinstance(result, MessageError):
             failed, error = failed + 1, error or result
@@ -154,6 +156,11 @@ def process(
         yield from _messages(bundle, found, _verdicts(found, picture, contract, classifier, config))
     if error is not None and failed == read:
         raise RecordingError(f"none of {read} images could be read: {error}")
+
+
+def _at_once(config: DetectConfig) -> int:
+    """How many images the network looks at in parallel."""
+    return (config.threads or os.cpu_count() or 1) if config.provider == "cpu" else 1
 
 
 def _as_in_the_thesis(config: DetectConfig) -> DetectConfig:
