@@ -178,3 +178,11 @@ def test_wrong_usage(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
         assert call("run", blind, "-o", out, *words) == 2
         assert said in capsys.readouterr().err
         assert not out.exists()
+
+
+def test_a_span_beside_the_log_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = resource("recordings", "demo_localize.mcap")
+    for words in (["--end", "1700000060000000000"], ["--start", "1900000000000000000"]):
+        assert call("run", log, "--stages", "cluster", "-o", tmp_path / "out.mcap", *words) == 2
+        told = capsys.readouterr().err
+        assert "no message lies between --start and --end; the log lasts from 17672256" in told

@@ -59,9 +59,14 @@ class Step:
 
 
 class Log:
-    """An open recording with its own messages apart from the results that stages left in it."""
+    """An open recording with its own messages apart from the results that stages left in it.
+
+    Raises:
+        UsageError: nothing of it lies in the time span.
+    """
 
     def __init__(self, recording: Recording, span: Span) -> None:
+        _check_span(recording, span)
         self.path = recording.path
         self.recording = recording
         self.own, self.results = own_layer(recording), result_layers(recording)
@@ -77,6 +82,14 @@ class Log:
         view = View(self.path, [self.own])
         counts = {entry.connection: entry.count for entry in view.channels}
         return sum(counts[connection] for connection in choose(view, channel, self.choice)) > 0
+
+
+def _check_span(recording: Recording, span: Span) -> None:
+    first, last = recording.start_ns, recording.end_ns
+    if last > 0 and ((span.start_ns or 0) > last or (span.end_ns is not None and span.end_ns <= first)):
+        raise UsageError(
+            f"{recording.path}: no message lies between --start and --end; the log lasts from {first} to {last} ns"
+        )
 
 
 def missing_stages(stage: Stage | Reduction, log: Log) -> list[str]:
