@@ -86,7 +86,9 @@ class Log:
 
 def _check_span(recording: Recording, span: Span) -> None:
     first, last = recording.start_ns, recording.end_ns
-    if last > 0 and ((span.start_ns or 0) > last or (span.end_ns is not None and span.end_ns <= first)):
+    if first is None or last is None:
+        return
+    if (span.start_ns or 0) > last or (span.end_ns is not None and span.end_ns <= first):
         raise UsageError(
             f"{recording.path}: no message lies between --start and --end; the log lasts from {first} to {last} ns"
         )
