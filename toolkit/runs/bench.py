@@ -48,13 +48,13 @@ def parts_folder(output: Path) -> Iterator[Path]:
     When it does not, what is finished stays for the next run.
     """
     folder = output.with_name(f".{output.name}.parts")
+    is_whole = False
     try:
         yield folder
-    except BaseException:
-        if folder.is_dir() and not any(folder.iterdir()):
-            folder.rmdir()
-        raise
-    shutil.rmtree(folder, ignore_errors=True)
+        is_whole = True
+    finally:
+        if folder.is_dir() and (is_whole or not any(folder.iterdir())):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def part_file(folder: Path, record: StageRecord) -> Path:
