@@ -82,7 +82,9 @@ def test_scenes_stand_beside_what_the_log_has(tmp_path: Path, capsys: pytest.Cap
 
 
 @pytest.mark.parametrize("source", ["tf", "pose"])
-def test_odometry_may_be_transforms_or_poses(tmp_path: Path, source: str) -> None:
+def test_odometry_may_be_transforms_or_poses(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], source: str
+) -> None:
     found: list[Stamped] = []
     poses = Channel("/tracked", PoseStamped)
     for stamped in messages():
@@ -97,6 +99,7 @@ def test_odometry_may_be_transforms_or_poses(tmp_path: Path, source: str) -> Non
     log, out = write(tmp_path / "log.mcap", found), tmp_path / "out.mcap"
     assert fuse(log, out, *(["--odom", "/tracked"] if source == "pose" else [])) == 0
     assert scenes(out) == [tuple(NAMES)] * 5
+    assert "without odometry" not in capsys.readouterr().err
 
 
 def test_transforms_from_before_the_start_count(tmp_path: Path) -> None:

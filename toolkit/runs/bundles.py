@@ -83,7 +83,8 @@ def inputs_of(
     for channel in reads:
         connections = choose(recording, channel, choice)
         for connection in connections:
-            found.setdefault(connection, channel)
+            if found.get(connection, TF_STATIC) == TF_STATIC:  # what is also odometry gives transforms all the same
+                found[connection] = channel
         if channel in needed and not sum(counts[connection] for connection in connections):
             raise RecordingError(_missing(recording, channel, bool(connections)))
     return found
