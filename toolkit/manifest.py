@@ -18,6 +18,8 @@ CONTENT = "content"
 """Entry of the manifest with a hash over the chunks that it was written beside: who edits the file breaks it."""
 LOSSES = "losses"
 """Entry of the manifest with what of the input could not be read when the output was written."""
+CARRIED = "carried"
+"""Entry of the manifest with the number of messages, by topic, from before a cut that were carried over to it."""
 STAGE = "mcap-landmarks.stage"
 """Entry of a channel's metadata that names the stage whose results it holds."""
 RECORDING = "recording"
@@ -184,6 +186,11 @@ def carried_fingerprint(metadata: Mapping[str, Mapping[str, str]], content: str)
 def told_losses(metadata: Mapping[str, Mapping[str, str]]) -> list[str]:
     """What of its input could not be read when an output was written."""
     return [str(loss) for loss in json.loads(metadata.get(RUN, {}).get(LOSSES, "[]"))]
+
+
+def told_carried(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, int]:
+    """The number of messages, by topic, from before its start that an output carried over."""
+    return {str(topic): int(count) for topic, count in json.loads(metadata.get(RUN, {}).get(CARRIED, "{}")).items()}
 
 
 def narrowed(fingerprint: str, **limits: object) -> str:

@@ -65,7 +65,7 @@ def test_it_says_what_it_did(tmp_path: Path, capsys: pytest.CaptureFixture[str])
 
 
 def test_times_may_be_written_as_dates(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = write_ros1(tmp_path / "a.bag")
+    source = write_ros2(tmp_path / "a")
     start, end = "2023-11-14T22:13:21Z", "2023-11-14T23:13:21.000000001+01:00"
     found = document(capsys, source, "--start", start, "--end", end, "-o", tmp_path / "a.mcap")
     assert found["outputs"][0]["topics"] == {"/scan": 1, "/talk": 0}

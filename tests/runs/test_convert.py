@@ -256,7 +256,7 @@ def test_robots_go_into_a_folder(tmp_path: Path) -> None:
 
 
 def test_topics_and_times_choose(tmp_path: Path) -> None:
-    source = write_ros1(tmp_path / "a.bag")
+    source = write_ros2(tmp_path / "a", count=40)
     done = one(source, tmp_path / "out.mcap", Selection(("/t.lk", "/nothing"), times(40)[3], times(40)[9]))
     assert done.topics == {"/talk": 6}
     assert (done.declared, done.lost) == (6, 0)

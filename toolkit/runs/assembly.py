@@ -1,19 +1,33 @@
 """The output of a run: a log's own messages with the results of all stages, each stage's in chunks of its own."""
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
-from toolkit.manifest import CONTENT, LOSSES, RUN, STAGE, Manifest, entry_text, narrowed, told_losses
+from toolkit.manifest import (
+    CARRIED,
+    CONTENT,
+    LOSSES,
+    RUN,
+    STAGE,
+    Manifest,
+    entry_text,
+    narrowed,
+    told_carried,
+    told_losses,
+)
+from toolkit.recording.lasting import carried_note, lasting, latest
 from toolkit.recording.reader import Recording
 from toolkit.recording.writer import RecordingWriter, create_recording
 from toolkit.runs.bench import Bench, Watch
 from toolkit.runs.view import Layer, View, own_layer
-from toolkit.stage import Connection
+from toolkit.stage import Connection, RawMessage
 
 
 def assemble(bench: Bench, output: Path, verb: str, inputs: Sequence[str], watch: Watch) -> tuple[list[str], list[str]]:
-    """Write the output, unless it is there already; notes on what was left out, and what of the log is unreadable.
+    """Write the output, unless it is there already; notes on what is in it, and what of the log is unreadable.
 
     `inputs` are the fingerprints of all recordings that the results were made from.
 
@@ -33,20 +47,36 @@ def assemble(bench: Bench, output: Path, verb: str, inputs: Sequence[str], watch
     manifest = Manifest(verb, inputs=tuple(inputs), options=request.options(), fingerprint=fingerprint, stages=records)
     metadata = {**source.metadata, RUN: manifest.entries()}
     own = _own(bench, results)
-    if not request.force and bench.earlier is not None and _is_there(bench.earlier, metadata, own, results, source):
-        return notes, [*source.losses, *told_losses(bench.earlier.metadata)]
-    view = View(source.path, [own, *results])
-    span = request.span
+    earlier = bench.earlier
+    if not request.force and earlier is not None and _is_there(earlier, metadata, own, results, source):
+        losses, carried = [*source.losses, *told_losses(earlier.metadata)], told_carried(earlier.metadata)
+    else:
+        losses, carried = _write(bench, output, metadata, [own, *results], watch)
+    return [*notes, *([carried_note(carried)] if carried else [])], losses
+
+
+def _write(
+    bench: Bench, output: Path, metadata: Mapping[str, Mapping[str, str]], layers: Sequence[Layer], watch: Watch
+) -> tuple[list[str], dict[str, int]]:
+    """Write the output; what of the log is unreadable, and what was carried over from before its start, by topic."""
+    span, source, view = bench.request.span, bench.log.recording, View(bench.log.path, layers)
+    carried = [] if span.start_ns is None else _before(view, span.start_ns)
+    counts = dict(Counter(raw.connection.topic for raw in carried))
     size = view.size_bytes(None, span.start_ns, span.end_ns)
     with create_recording(output, metadata) as writer, watch(f"write {output.name}", size) as progress:
-        clean = _declare(writer, own)
-        for raw in view.messages(None, span.start_ns, span.end_ns, progress):
+        clean = _declare(writer, layers[0])
+        for raw in chain(carried, view.messages(None, span.start_ns, span.end_ns, progress)):
             writer.write(raw._replace(connection=clean[raw.connection]) if raw.connection in clean else raw)
-        for attachment in () if request.results_only else source.attachments():
+        for attachment in () if bench.request.results_only else source.attachments():
             writer.attach(attachment)
-        if source.losses:
-            writer.metadata[RUN][LOSSES] = entry_text(source.losses)
-    return notes, list(source.losses)
+        told = {LOSSES: source.losses, CARRIED: counts}
+        writer.metadata[RUN].update({name: entry_text(value) for name, value in told.items() if value})
+    return list(source.losses), counts
+
+
+def _before(view: View, start_ns: int) -> list[RawMessage]:
+    """What holds at the start of an output because of messages before it."""
+    return latest(view.messages(lasting(entry.connection for entry in view.channels), None, start_ns), start_ns)
 
 
 def _own(bench: Bench, results: Sequence[Layer]) -> Layer:
@@ -75,7 +105,7 @@ def _is_there(
     source: Recording,
 ) -> bool:
     """Whether an earlier output holds all that would be written."""
-    own_entries = {k: v for k, v in earlier.metadata.get(RUN, {}).items() if k not in {CONTENT, LOSSES}}
+    own_entries = {k: v for k, v in earlier.metadata.get(RUN, {}).items() if k not in {CONTENT, LOSSES, CARRIED}}
     found = {**earlier.metadata, RUN: own_entries}
     return (
         earlier.is_ours

@@ -4,15 +4,17 @@ import contextlib
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 from toolkit.errors import RecordingError, ToolkitError, UsageError
-from toolkit.manifest import RUN, Manifest, file_hash
+from toolkit.manifest import CARRIED, RUN, Manifest, entry_text, file_hash
 from toolkit.messages.qos import KEY
+from toolkit.recording.lasting import carried_note, lasting, latest
 from toolkit.recording.writer import create_recording
 from toolkit.runs.config import Settings, effective
 from toolkit.runs.logs import McapLog, OpenLog, open_logs
@@ -170,11 +172,13 @@ class _Job:
             done.dropped.update(log.dropped)
             done.notes.extend(log.notes)
         counts: Counter[Connection] = Counter()
+        carried = self._before_start()
         with create_recording(self._target, self._metadata(hashes)) as writer:
             for connection in self._unified.values():
                 writer.declare(connection)
                 done.topics[connection.topic] += 0
-            for raw in self._messages(advance):
+            within = self._messages(self._unified, self._selection.start_ns, self._selection.end_ns, advance)
+            for raw in chain(carried, within):
                 writer.write(raw)
                 counts[raw.connection] += 1
             for part in self._parts:
@@ -182,14 +186,24 @@ class _Job:
                     part.copy_attachments(writer)
             for connection, count in counts.items():
                 done.topics[connection.topic] += count
-            self._account(done, counts)
+            if carried:
+                on_topics = Counter(raw.connection.topic for raw in carried)
+                done.notes.append(carried_note(on_topics))
+                writer.metadata[RUN][CARRIED] = entry_text(on_topics)
+            self._account(done, counts, len(carried))
         return done
 
-    def _messages(self, advance: Progress) -> Iterator[RawMessage]:
-        chosen = self._selection
+    def _messages(
+        self,
+        connections: Collection[Connection],
+        start_ns: int | None,
+        end_ns: int | None,
+        advance: Progress | None = None,
+    ) -> Iterator[RawMessage]:
+        """The messages of some connections, of all parts by time, on the connections of the output."""
         unified = self._unified
         pieces: list[Piece] = [
-            (part.start_ns, partial(part.messages, set(unified), chosen.start_ns, chosen.end_ns, advance))
+            (part.start_ns, partial(part.messages, set(connections), start_ns, end_ns, advance))
             for part in self._parts
             if part.start_ns is not None
         ]
@@ -199,8 +213,13 @@ class _Job:
         for connection, log_time_ns, publish_time_ns, sequence, data in merge(pieces):
             yield RawMessage(unified[connection], log_time_ns, publish_time_ns, sequence, data)
 
-    def _account(self, done: Converted, counts: Counter[Connection]) -> None:
-        """Compare what was read with what the storage declares; with no message at all there is no output."""
+    def _before_start(self) -> list[RawMessage]:
+        """What holds at the start that was chosen because of messages before it."""
+        start_ns = self._selection.start_ns
+        return [] if start_ns is None else latest(self._messages(lasting(self._unified), None, start_ns), start_ns)
+
+    def _account(self, done: Converted, counts: Counter[Connection], carried: int) -> None:
+        """Compare what was read with what the storage declares; with no message but carried ones there is no output."""
         declared = sum(self._declared.values())
         missing = sum(max(count - counts[connection], 0) for connection, count in self._declared.items())
         read = counts.total()
@@ -212,7 +231,7 @@ class _Job:
         else:
             done.lost = missing
         done.declared = read + done.lost
-        if not read:
+        if read == carried:
             raise RecordingError(f"{self._where()}: {self._why_nothing(declared, done)}")
 
     def _where(self) -> str:
