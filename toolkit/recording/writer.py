@@ -13,6 +13,7 @@ from mcap import records
 from zstandard import ZstdCompressor
 
 from toolkit.atomic import atomic_file
+from toolkit.channels import MAP, MAP_MARKERS, MAP_PATH, TF_STATIC, TRUTH_OBJECTS
 from toolkit.errors import RecordingError
 from toolkit.manifest import CONTENT, RUN, STAGE, entry_text
 from toolkit.messages.codec import encode
@@ -25,7 +26,7 @@ from toolkit.stage import Channel, Connection, RawMessage, Stamped
 CHUNK_BYTES = 1 << 20
 CHUNK_NS = 5 * 10**9
 _IMAGE_TYPES = frozenset({"sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"})
-_LATCHED = frozenset({"/tf_static", "/landmarks/map", "/ground_truth/objects"})
+_LATCHED = frozenset(channel.topic for channel in (TF_STATIC, MAP, MAP_MARKERS, MAP_PATH, TRUTH_OBJECTS))
 
 
 @contextlib.contextmanager
