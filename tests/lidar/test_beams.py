@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from tests.lidar.scans import ANGLES_RAD, disc, ranges
 from toolkit.geometry.se2 import Array, exp
 from toolkit.lidar.beams import Beams, Limits, echoes, sweep, together
-from toolkit.lidar.clouds import slice_cloud
+from toolkit.lidar.clouds import in_slice, slice_beams
 
 THINGS = [disc(3.0, 0.4, 0.15), disc(-2.0, 2.0, 0.25)]
 UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -115,8 +115,32 @@ def test_a_slice_of_a_cloud_is_the_nearest_return_of_each_direction() -> None:
     behind = ring + 0.5 * (ring - [0.1, 0.0, 0.2])
     ceiling = np.column_stack([ring[:, :2] * 0.5, np.full(720, 2.0)])
     cloud = np.concatenate([behind, ceiling, ring, np.full((3, 3), np.nan)])
-    beams = slice_cloud(cloud, np.array([0.1, 0.0]), (0.1, 0.3), np.deg2rad(0.5))
+    inside, origin = in_slice(cloud, (0.1, 0.3)), np.array([0.1, 0.0])
+    beams = slice_beams(cloud[inside, :2], origin, np.deg2rad(0.5))
     assert len(beams.ranges_m) == 720
     expected = ring[np.isfinite(distances), :2]
     np.testing.assert_allclose(hits(beams), expected[np.lexsort(expected.T)], atol=1e-9)
-    assert np.isinf(slice_cloud(cloud, np.array([0.1, 0.0]), (5.0, 6.0), 0.1).ranges_m).all()
+    assert not in_slice(cloud, (5.0, 6.0)).any()
+    nothing = slice_beams(np.zeros((0, 2)), origin, 0.1)
+    assert np.isinf(nothing.ranges_m).all()
+    np.testing.assert_array_equal(nothing.origins_xy, np.broadcast_to(origin, (63, 2)))
+
+
+def test_a_slice_of_a_cloud_leaves_from_where_the_lidar_was() -> None:
+    """The same points with their times, and the beams that a scan with the same times has."""
+    then = exp(np.linspace(-0.1, 0.1, len(ANGLES_RAD))[:, None] * np.array([1.0, 0.0, 2.0]))
+    distances = ranges(THINGS, base_from_lidar=then)
+    seen = np.isfinite(distances)
+    points = distances[seen, None] * np.column_stack([np.cos(ANGLES_RAD[seen]), np.sin(ANGLES_RAD[seen])])
+    expected = sweep(ANGLES_RAD, distances, np.eye(4), then)
+    beams = slice_beams(points, np.zeros(2), 1e-3, then[seen])
+    np.testing.assert_allclose(hits(beams), hits(expected), atol=1e-9)
+    off = [np.abs(np.hypot(*(hits(beams) - pose[:2]).T) - size[0]) for pose, size in THINGS]
+    np.testing.assert_allclose(np.min(off, axis=0), 0.0, atol=1e-9)
+    by_angle, seen_too = np.argsort(expected.angles_rad), np.isfinite(beams.ranges_m)
+    for i in np.flatnonzero(seen_too):
+        nearest = by_angle[np.argmin(np.abs(expected.angles_rad[by_angle] - beams.angles_rad[i]))]
+        np.testing.assert_allclose(beams.origins_xy[i], expected.origins_xy[nearest], atol=1e-9)
+    # Beams that met nothing leave from where those beside them do, not from where the LiDAR is now.
+    beside = np.flatnonzero(seen_too[:-1] & ~seen_too[1:])
+    np.testing.assert_array_equal(beams.origins_xy[beside + 1], beams.origins_xy[beside])

@@ -132,8 +132,13 @@ def test_a_slice_of_a_cloud_is_a_scan() -> None:
         results([bundle(cloud, mounting())])
 
 
-def drive(velocity: Array, count: int, rng: np.random.Generator, turn_s: float = 0.2) -> list[Bundle]:
-    """Scans of a robot that drives and turns, each beam at its time, associated with odometry."""
+def drive(
+    velocity: Array, count: int, rng: np.random.Generator, turn_s: float = 0.2, stamped_s: float | None = None
+) -> list[Bundle]:
+    """Scans of a robot that drives and turns, each beam at its time, associated with odometry.
+
+    With `stamped_s` they are clouds, stamped so long after the first of their points.
+    """
     rate = 30
     messages = [
         (ODOMETRY, SECOND + i * SECOND // rate, Odometry.planar(
@@ -145,17 +150,29 @@ def drive(velocity: Array, count: int, rng: np.random.Generator, turn_s: float =
         start = SECOND + SECOND // 3 + k * SECOND
         times = (start - SECOND) / 1e9 + turn_s * np.arange(360) / 360
         poses = exp(times[:, None] * velocity)
-        message = scan(ranges(THINGS, rng, base_from_lidar=poses), start, turn_s=turn_s)
+        distances = ranges(THINGS, rng, base_from_lidar=poses)
+        message: Message = scan(distances, start, turn_s=turn_s)
+        if stamped_s is not None:
+            message = cloud_of(distances, start + round(stamped_s * SECOND), turn_s, stamped_s)
         messages.append((SCAN, start + int(turn_s * SECOND), message))
     messages.append((TF_STATIC, 0, TFMessage((mounting(),))))
     messages.sort(key=lambda entry: entry[1])
     return list(associate(messages, SCAN, Association(), held=[TF_STATIC]))
 
 
-def test_motion_under_a_scan_is_taken_out() -> None:
-    velocity = np.array([0.3, 0.0, 1.2])
-    for one in drive(velocity, 3, np.random.default_rng(1)):
-        (found,) = results([one])
+def cloud_of(distances: Array, stamp_ns: int, turn_s: float, stamped_s: float) -> PointCloud2:
+    places = np.column_stack([np.cos(ANGLES_RAD), np.sin(ANGLES_RAD), np.zeros(360)])
+    seen = np.isfinite(distances)
+    times_ns = np.round((turn_s * np.arange(360) / 360 - stamped_s) * SECOND).astype(np.int64)
+    points = distances[seen, None] * places[seen]
+    return PointCloud2(stamp_ns, "laser", points.astype(np.float32), times_ns[seen])
+
+
+@pytest.mark.parametrize("stamped_s", [None, 0.0, 0.1, 0.2])
+def test_motion_under_a_scan_or_cloud_is_taken_out(stamped_s: float | None) -> None:
+    velocity, config = np.array([0.3, 0.0, 1.2]), ClusterConfig(slice_m=(0.1, 0.3), slice_beam_deg=1.0)
+    for one in drive(velocity, 3, np.random.default_rng(1), stamped_s=stamped_s):
+        (found,) = results([one], config)
         pose = exp(velocity * (one.stamp_ns - SECOND) / 1e9)
         truth = transform_points(compose(exp(-velocity * (one.stamp_ns - SECOND) / 1e9), np.zeros(3)), [3.0, 0.6])
         np.testing.assert_allclose(transform_points(pose, truth), [3.0, 0.6], atol=1e-9)

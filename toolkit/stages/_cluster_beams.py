@@ -8,7 +8,7 @@ from toolkit.errors import RecordingError, UsageError
 from toolkit.geometry import frames
 from toolkit.geometry.se2 import Array, between, exp, interpolate
 from toolkit.lidar.beams import Beams, Limits, echoes, sweep, together
-from toolkit.lidar.clouds import slice_cloud
+from toolkit.lidar.clouds import in_slice, slice_beams
 from toolkit.messages.codec import Message
 from toolkit.messages.points import PointCloud2
 from toolkit.messages.scan import LaserScan
@@ -53,7 +53,7 @@ def beams_of(bundle: Bundle, base: str, mounting: Mounting, config: ClusterConfi
             continue
         base_from_lidar = mounting.lookup(bundle, base, frame_of(message))
         if isinstance(message, PointCloud2):
-            found.append(_slice(message, base_from_lidar, config, limits))
+            found.append(_slice(message, bundle, base_from_lidar, config, limits))
         elif isinstance(message, LaserScan) and makes_sense(message):
             found.append(_sweep(message, bundle, base_from_lidar, limits))
     return together(found) if found else None
@@ -95,15 +95,20 @@ def _times_ns(scan: LaserScan, stamp_ns: int) -> NDArray[np.int64]:
 def _moved(odometry: OdometryAt, stamp_ns: int, times_ns: NDArray[np.int64]) -> Array:
     """Where the base was at some times (N, 3), in the base frame at another."""
     steps = odometry.steps
-    if steps is None or not (len(steps.stamps_ns) > 1 and steps.stamps_ns[0] <= times_ns[0]):
+    if steps is None or not (len(steps.stamps_ns) > 1 and steps.stamps_ns[0] <= times_ns.min()):
         return exp((times_ns - stamp_ns)[:, None] / 1e9 * odometry.velocity)
     # What the log does not tell any more is little: a bundle waits until odometry has passed its last beam.
     known = np.minimum(times_ns, steps.stamps_ns[-1])
     return between(odometry.odom_from_base, interpolate(steps.stamps_ns, steps.odom_from_base, known))
 
 
-def _slice(cloud: PointCloud2, base_from_lidar: Array, config: ClusterConfig, limits: Limits) -> Beams:
+def _slice(cloud: PointCloud2, bundle: Bundle, base_from_lidar: Array, config: ClusterConfig, limits: Limits) -> Beams:
     if config.slice_m is None:
         raise UsageError("a point cloud is cut between two heights above the base frame: give --slice ZMIN:ZMAX in m")
     points = frames.apply(base_from_lidar, cloud.points_m)
-    return slice_cloud(points, base_from_lidar[:2, 3], config.slice_m, np.deg2rad(config.slice_beam_deg), limits)
+    inside, moved = in_slice(points, config.slice_m), None
+    if bundle.odometry is not None and cloud.times_ns is not None and inside.any():
+        times_ns = (cloud.stamp_ns or bundle.stamp_ns) + cloud.times_ns[inside]
+        moved = _moved(bundle.odometry, bundle.stamp_ns, times_ns)
+    beam_rad = np.deg2rad(config.slice_beam_deg)
+    return slice_beams(points[inside, :2], base_from_lidar[:2, 3], beam_rad, moved, limits)
