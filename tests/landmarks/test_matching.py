@@ -133,3 +133,13 @@ def test_maps_that_cannot_localize() -> None:
     point = LandmarkMap.surveyed(("a", "b"), ("x", "x"), [[1.0, 2.0], [1.0, 2.0]], Source("import", "test"))
     with pytest.raises(MapError, match="lie in one place"):
         MapIndex.build(point)
+
+
+@pytest.mark.parametrize("third", [(5.0, 0.0), (5.0, 4.0)], ids=["seen twice", "in line"])
+def test_objects_in_one_place_or_exactly_in_line(third: tuple[float, float]) -> None:
+    points = np.array([[5.0, 0.0], [5.0, 1.0], third])
+    options = ((("class 0", 1.0),),) * 3
+    spread = np.tile(0.02**2 * np.eye(2), (3, 1, 1))
+    seen = SceneObjects(0, "base", ("a", "b", "c"), options, points, spread, np.zeros(3))
+    found = matcher_of(appendix_c(np.random.default_rng(13))).match([seen])[0]
+    assert found.message.status in (Status.AMBIGUOUS, Status.NO_MATCH)

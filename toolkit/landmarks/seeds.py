@@ -1,10 +1,16 @@
 """Candidate poses of a bundle anywhere in the map, from its pairs and triangles of objects.
 
-This and `verification` find what a maximum clique over pairwise consistency would: take the pairs (object, landmark) as
-nodes, joined where distances agree. A clique of three nodes or more holds a triangle of objects that is like one of the
-map, so it grows from one of the seeds made here. The verifier grows each under one pose, by the joint chi-square, which
-pairwise distances only approximate and which tells a clique from its mirror image. All triangles of up to six objects
-are seeds; of more, those of near objects, so that the work stays within bounds (24 objects at most) without a clock.
+This and `verification` find the maximum clique over pairwise consistency: take the pairs (object, landmark) as nodes,
+joined where distances agree. A clique of three nodes or more holds a triangle of objects that is like one of the map,
+and any of its triangles tells the pose under which the verifier finds all the rest of it. So no search over subsets is
+needed, only a triangle out of every clique. Objects are cut into sectors of eight at most, of which all triangles are
+seeds: of up to 8 objects no triangle is missed, of up to 16 any five have three in one sector, of up to 24 any seven
+(what matches less than half of a bundle is not accepted anyway). So the work is bounded without a clock, and the answer
+the same on any machine. The verifier goes by the joint chi-square, which pairwise distances only approximate and which
+tells a clique from its mirror image.
+
+Exact is this where the index holds all triangles of the map (up to a hundred landmarks). Larger maps keep those of near
+landmarks, so there a clique needs one such; triangles of near objects, added for more than eight, are likeliest to be.
 """
 
 from dataclasses import dataclass
@@ -22,8 +28,8 @@ from toolkit.landmarks.verification import UNMATCHED, Candidates, Constellations
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Of more than so many objects only triangles of near ones are looked up.
-_ALL_TRIANGLES_OF = 6
+# All triangles of so many objects are looked up; of more, those within sectors and those of an object with near ones.
+_SECTOR = 8
 _NEAR = 4
 # Objects clearly beside each other are so many standard deviations apart.
 _CLEARLY = 5.0
@@ -34,6 +40,8 @@ _BOX_SIGMAS = 3.5
 _GATE = float(chi2.ppf(0.9995, 3))
 # Classes at least so likely, against the likeliest of an object, are looked for too.
 _PLAUSIBLE, _PLAUSIBLE_IN_SMALL = 0.1, 5e-3
+# Share of a side's variance that no other side has: without it, three objects exactly in line would have none.
+_OWN = 1e-6
 # Pairs of the same classes in the whole map, on average.
 _FEW_PAIRS = 20
 # A pair that fits in so many places says nothing.
@@ -64,7 +72,7 @@ class Finder:
 
     def triangles(self, sets: Constellations, fresh: NDArray[np.bool_]) -> Candidates:
         """Candidates from triangles of objects, K >= 3, of those that have a `fresh` one (B, K) among them."""
-        queries = self._classes(sets, *_with_any(_triangles_of(sets), fresh))
+        queries = self._classes(sets, *_triangles_of(sets, fresh))
         queries, sides, spread = self._oriented(sets, queries)
         sigma = np.sqrt(spread[:, np.arange(3), np.arange(3)].max(axis=1))
         hits = self.index.find_triangles(sides, queries.classes, _BOX_SIGMAS * sigma)
@@ -124,7 +132,9 @@ class Finder:
         columns = (2 * queries.objects[..., None] + np.arange(2)).reshape(len(points), 2 * size)
         spread = sets.covariance[queries.of[:, None, None], columns[:, :, None], columns[:, None, :]]
         spread = spread + self.map_sigma_m**2 * np.eye(2 * size)
-        return sides, by_point @ spread @ by_point.swapaxes(1, 2)
+        spread = by_point @ spread @ by_point.swapaxes(1, 2)
+        most = spread[:, np.arange(size), np.arange(size)].max(axis=1)
+        return sides, spread + _OWN * most[:, None, None] * np.eye(size)
 
     def _oriented(self, sets: Constellations, queries: _Queries) -> tuple[_Queries, Array, Array]:
         """Triangles counter-clockwise; those too flat to tell also the other way round."""
@@ -178,11 +188,28 @@ def _with_any(groups: Ints, fresh: NDArray[np.bool_]) -> tuple[Ints, Ints]:
     return of, groups[of, group]
 
 
-def _triangles_of(sets: Constellations) -> Ints:
-    """Triangles (B, T, 3) of objects: all of few, else each with two of its nearest that lie clearly beside it."""
+def _triangles_of(sets: Constellations, fresh: NDArray[np.bool_]) -> tuple[Ints, Ints]:
+    """Triangles to look up: of which set (Q,), and the objects (Q, 3), one of them fresh."""
     count, k = sets.points_xy.shape[:2]
-    if k <= _ALL_TRIANGLES_OF:
-        return np.tile(_groups(k, 3), (count, 1, 1))
+    if k <= _SECTOR:
+        return _with_any(np.tile(_groups(k, 3), (count, 1, 1)), fresh)
+    both = np.concatenate([_within_sectors(sets), _of_near(sets)], axis=1)
+    of, objects = _with_any(np.sort(both, axis=2), fresh)
+    once = np.unique(np.column_stack([of, objects]) @ np.array([k**3, k**2, k, 1]), return_index=True)[1]
+    return of[once], objects[once]
+
+
+def _within_sectors(sets: Constellations) -> Ints:
+    """All triangles (B, T, 3) of objects within each of as few sectors around the robot as hold all objects."""
+    k = sets.points_xy.shape[1]
+    by_bearing = np.argsort(np.arctan2(sets.points_xy[..., 1], sets.points_xy[..., 0]), axis=1, kind="stable")
+    sectors = np.array_split(np.arange(k), -(-k // _SECTOR))
+    return by_bearing[:, np.concatenate([sector[_groups(len(sector), 3)] for sector in sectors])]
+
+
+def _of_near(sets: Constellations) -> Ints:
+    """Triangles (B, T, 3) of each object with two of its nearest that lie clearly beside it."""
+    count, k = sets.points_xy.shape[:2]
     apart = np.linalg.norm(sets.points_xy[:, :, None] - sets.points_xy[:, None], axis=-1)
     variance = sets.covariance[:, np.arange(2 * k), np.arange(2 * k)].reshape(count, k, 2).sum(axis=2)
     apart = np.where(apart < _CLEARLY * np.sqrt(variance)[:, :, None], apart + apart.max(), apart)
