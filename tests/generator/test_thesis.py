@@ -46,11 +46,28 @@ def test_the_second_log_stops_at_appendix_d_and_faces_the_groups() -> None:
 
 
 @pytest.mark.parametrize("name", ["thesis_map", "thesis_localize"])
-def test_with_drift_only_odometry_and_seed_differ(name: str) -> None:
+def test_with_drift_the_world_is_the_same(name: str) -> None:
     plain, drifting = load_scenario(name).scenario, load_scenario(f"{name}_drift").scenario
-    assert (drifting.objects, drifting.trajectory) == (plain.objects, plain.trajectory)
+    assert drifting.objects == plain.objects
     assert drifting.odometry.source == "encoders"
     assert (drifting.odometry.distance_slip, drifting.odometry.heading_slip_deg) == (0.02, 0.5)
+
+
+def test_the_second_drifting_log_is_the_same_drive() -> None:
+    plain, drifting = (load_scenario(name).scenario for name in ("thesis_localize", "thesis_localize_drift"))
+    assert (drifting.trajectory, drifting.camera) == (plain.trajectory, plain.camera)
+
+
+def test_the_drifting_map_has_the_same_stops_and_closes_its_loop() -> None:
+    plain, drifting = load_scenario("thesis_map").scenario, load_scenario("thesis_map_drift").scenario
+    way = drifting.trajectory.waypoints
+    assert tuple(point for point in way if point.is_stop) == plain.trajectory.waypoints
+    points = np.array([point.at for point in way])
+    assert np.hypot(*np.diff(points, axis=0).T).sum() == pytest.approx(530, abs=5)
+    again = points[[i for i, point in enumerate(way) if not point.is_stop]]
+    for group in (1, 5, 6, 7, 14, 16):
+        first = np.array(plain.trajectory.waypoints[group - 1].at)
+        assert np.linalg.norm(again - first, axis=1).min() < 3.0, f"group {group} is passed once only"
 
 
 def test_the_loop_comes_back_after_340_m() -> None:
