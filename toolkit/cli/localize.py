@@ -33,6 +33,8 @@ def command(
     remap: options.Remap = None,
     odom: options.OdometryTopic = None,
     scan: options.ScanTopics = None,
+    scan_from: options.ScanFrom = None,
+    heights: options.Slice = None,
     image: options.ImageTopic = None,
     model: options.Model = None,
     extrinsics: options.Extrinsics = None,
@@ -46,8 +48,8 @@ def command(
 
     Where a log has no scene objects, they are made first, from images and scans.
     """
-    span = options.span(start, end, remap, {"odometry": odom, "scan": scan, "image": image})
-    configured = config_file, settings, method
+    span = options.span(start, end, remap, {"odometry": odom, "scan": options.scans(scan, scan_from), "image": image})
+    configured = config_file, options.sliced(settings, heights), method
     asked_ns = options.time_ns(at, "--at")
     files = {"map": map_file, "model": model, "extrinsics": extrinsics}
     given = Given(configured, span, files, options.thinning(image_rate, every), results_only, force)

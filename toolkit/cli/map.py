@@ -31,6 +31,8 @@ def command(
     remap: options.Remap = None,
     odom: options.OdometryTopic = None,
     scan: options.ScanTopics = None,
+    scan_from: options.ScanFrom = None,
+    heights: options.Slice = None,
     image: options.ImageTopic = None,
     model: options.Model = None,
     extrinsics: options.Extrinsics = None,
@@ -47,9 +49,9 @@ def command(
     if from_reference:
         _from_reference(logs, map_file, json)
         return
-    span = options.span(start, end, remap, {"odometry": odom, "scan": scan, "image": image})
+    span = options.span(start, end, remap, {"odometry": odom, "scan": options.scans(scan, scan_from), "image": image})
     files = {"model": model, "extrinsics": extrinsics}
-    configured, thinning = (config_file, settings, method), options.thinning(image_rate, every)
+    configured, thinning = (config_file, options.sliced(settings, heights), method), options.thinning(image_rate, every)
     run = _build(logs, map_file, prior, output, Given(configured, span, files, thinning, results_only, force))
     for log in run.logs:
         tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)

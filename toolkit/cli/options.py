@@ -31,6 +31,13 @@ ImageTopic = Annotated[str | None, typer.Option("--image", help="Image topic, wh
 ScanTopics = Annotated[
     list[str] | None, typer.Option("--scan", help="Scan topic, where the log has several; twice for two LiDARs.")
 ]
+ScanFrom = Annotated[
+    str | None, typer.Option("--scan-from", metavar="TOPIC", help="Point cloud to take a slice of as the scan.")
+]
+Slice = Annotated[
+    str | None,
+    typer.Option("--slice", metavar="ZMIN:ZMAX", help="Heights of the slice above the base frame, in metres."),
+]
 ImageRate = Annotated[
     float | None, typer.Option("--image-rate", metavar="HZ", help="Leave out images that come faster than this.")
 ]
@@ -69,6 +76,35 @@ def span(
                 raise UsageError(f"--{role} {' '.join(several)}: two are the most that are merged")
             chosen.update(zip((role, f"second_{role}"), several, strict=False))
     return Span(Choice(chosen, parse_remaps(remaps or [])), time_ns(start, "--start"), time_ns(end, "--end"))
+
+
+def scans(topics: list[str] | None, cloud: str | None) -> list[str] | None:
+    """The topics to read scans from.
+
+    Raises:
+        UsageError: both are given.
+    """
+    if topics and cloud:
+        raise UsageError("--scan-from takes the place of --scan; to merge a scan and a cloud give both with --scan")
+    return [cloud] if cloud else topics
+
+
+def sliced(settings: list[str] | None, heights: str | None) -> list[str]:
+    """The settings with the one that a slice of a point cloud stands for.
+
+    Raises:
+        UsageError: the heights cannot be read.
+    """
+    if heights is None:
+        return settings or []
+    low, colon, high = heights.partition(":")
+    try:
+        slice_m = (float(low), float(high)) if colon else (0.0, 0.0)
+    except ValueError:
+        slice_m = (0.0, 0.0)
+    if not slice_m[0] < slice_m[1]:
+        raise UsageError(f"--slice {heights}: give two heights in metres, the lower one first, such as 0.1:0.3")
+    return [*(settings or []), f"cluster.slice_m=[{slice_m[0]}, {slice_m[1]}]"]
 
 
 def thinning(rate_hz: float | None, every: str | None) -> "Thinning":

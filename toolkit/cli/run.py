@@ -32,6 +32,8 @@ def command(
     remap: options.Remap = None,
     odom: options.OdometryTopic = None,
     scan: options.ScanTopics = None,
+    scan_from: options.ScanFrom = None,
+    heights: options.Slice = None,
     image: options.ImageTopic = None,
     image_rate: options.ImageRate = None,
     every: options.Every = None,
@@ -43,9 +45,9 @@ def command(
     asked = [name.strip() for name in stages.split(",") if name.strip()]
     if not asked:
         raise UsageError("--stages names none; write for example --stages detect,cluster,fuse")
-    span = options.span(start, end, remap, {"odometry": odom, "scan": scan, "image": image})
+    span = options.span(start, end, remap, {"odometry": odom, "scan": options.scans(scan, scan_from), "image": image})
     files = {"map": map_file, "model": model, "names": names, "extrinsics": extrinsics}
-    configured, thinning = (config_file, settings, method), options.thinning(image_rate, every)
+    configured, thinning = (config_file, options.sliced(settings, heights), method), options.thinning(image_rate, every)
     given = Given(configured, span, files, thinning, results_only, force)
     finish("run", run_over("run", asked, logs, output, given), _document, _print, json)
 

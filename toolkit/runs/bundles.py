@@ -13,7 +13,7 @@ from toolkit.messages.scene import SceneObjects
 from toolkit.messages.transforms import TFMessage
 from toolkit.recording.association import Association, associate
 from toolkit.recording.trail import odometry_from
-from toolkit.runs.inputs import ROLES, Choice, choose, message_type
+from toolkit.runs.inputs import ROLES, Choice, choose, could_be, message_type
 from toolkit.runs.view import Readable
 from toolkit.stage import Bundle, Channel, Connection, RawMessage
 
@@ -101,10 +101,8 @@ def _missing(recording: Readable, channel: Channel[Any], empty: bool) -> str:
             f"as it with --remap TOPIC={channel.topic}"
         )
     kinds = " or ".join(role.types)
-    return (
-        f"{recording.path}: there is no {role.name} ({kinds}); choose a topic with {role.option}, or take "
-        f"a log that has one, such as {channel.topic}"
-    )
+    remedy = f"choose a topic with {role.option}, or take a log that has one, such as {channel.topic}"
+    return f"{recording.path}: there is no {role.name} ({kinds}); {could_be(recording, channel) or remedy}"
 
 
 def read_bundles(

@@ -17,6 +17,8 @@ from toolkit.messages.transforms import TFMessage
 from toolkit.runs.view import Readable
 from toolkit.stage import Channel, Connection
 
+_NO_INPUTS = ("/landmarks/", "/ground_truth/")
+
 OWN_OBJECTS = frozenset({"/landmarks/scan_objects", channels.MAP.topic, channels.TRUTH_OBJECTS.topic})
 
 
@@ -85,6 +87,18 @@ def topics_for(role: Role, present: Collection[tuple[str, str]]) -> list[str]:
     return [topic for topic in fitting if not topic.startswith("/landmarks/")]
 
 
+def could_be(recording: Readable, channel: Channel[Any]) -> str:
+    """Which topics a user could choose as a channel that none is by itself, and how; empty if there are none."""
+    role = ROLES.get(channel)
+    if role is None:
+        return ""
+    others = {message.ROS_TYPE for message in role.others}
+    topics = [entry.connection.topic for entry in recording.channels if entry.connection.message_type in others]
+    fitting = sorted({topic for topic in topics if not topic.startswith(_NO_INPUTS) and not topic.endswith("_static")})
+    how = "--scan-from TOPIC --slice ZMIN:ZMAX" if channel == channels.SCAN else f"{role.option} TOPIC"
+    return f"{' or '.join(fitting)} could be it, choose with {how}" if fitting else ""
+
+
 def choose(recording: Readable, channel: Channel[Any], choice: Choice) -> tuple[Connection, ...]:
     """The connections that a role is read from, none if the recording has no such topic.
 
@@ -106,6 +120,7 @@ def choose(recording: Readable, channel: Channel[Any], choice: Choice) -> tuple[
         fitting = _of_the_image(recording, fitting, choice)
     if asked is None and len(fitting) > 1:
         how = f"{role.option} TOPIC" if role.option != "--remap" else f"--remap TOPIC={channel.topic}"
+        how += ", twice to merge two" if channel == channels.SCAN else ""
         raise UsageError(f"{recording.path}: {' and '.join(fitting)} could be the {role.name}; choose with {how}")
     topic = asked or (fitting[0] if fitting else None)
     found = tuple(connection for name, connection in named if name == topic)

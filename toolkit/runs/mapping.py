@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 from toolkit.atomic import check_target
 from toolkit.channels import MAP_MARKERS, MAP_PATH, MAP_POSE
-from toolkit.errors import RecordingError
+from toolkit.errors import MapError, RecordingError
 from toolkit.landmarks.database import read_manifest, read_map, write_map
 from toolkit.landmarks.markers import markers_from_map
 from toolkit.landmarks.model import LandmarkMap, Source
@@ -23,7 +24,16 @@ from toolkit.runs.bench import Bench, StageRun, Watch, open_bench, part_file, pa
 from toolkit.runs.bundles import Reading, inputs_of, read_bundles
 from toolkit.runs.config import load
 from toolkit.runs.pipeline import check_output, told
-from toolkit.runs.plan import Request, Step, choice_options, inputs_of_stage, missing_stages, plan, record_of
+from toolkit.runs.plan import (
+    Request,
+    Step,
+    choice_options,
+    inputs_of_stage,
+    is_result,
+    missing_stages,
+    plan,
+    record_of,
+)
 from toolkit.runs.step import bundle_count, counted, outcome_of
 from toolkit.stage import Reduction, Stamped
 from toolkit.stages import find_stage
@@ -117,6 +127,8 @@ def _reduction() -> Reduction:
 
 def _plan_log(place: str, stage: Reduction, config: Any, request: Request, task: MapTask, parts: Path) -> _LogPlan:
     with open_bench(request, parts, None) as bench:
+        sensed = [channel for channel in stage.reads if not is_result(channel, request.span.choice)]
+        inputs_of(bench.log.view(), sensed, sensed, request.span.choice)  # before hours are spent on the others
         steps = tuple(plan(request, bench.log, missing_stages(stage, bench.log)))
         options = choice_options(request.span.choice, stage.reads)
         record = record_of(stage, config, task.files, inputs_of_stage(stage, bench.log, steps), options)
@@ -182,7 +194,10 @@ def _build(
         logs.append(MappedLog(entry.request.recording, entry.fingerprint, tuple(runs), outcome))
     with watch("solve", None, "steps"):
         prior = read_map(task.prior) if task.prior is not None else None
-        landmark_map, trajectories = stage.solve(observations, prior, config)
+        try:
+            landmark_map, trajectories = stage.solve(observations, prior, config)
+        except MapError as error:
+            raise MapError(f"{_named(logs)}: {error}{_found_by(logs)}") from error
     for entry, trajectory in zip(plans, trajectories, strict=True):
         if entry.request.recording in task.outputs:
             _write_part(_share(entry, record), landmark_map, trajectory, parts)
@@ -191,6 +206,22 @@ def _build(
     manifest = Manifest("map", inputs=fingerprints, options=outcomes, stages=(record,))
     write_map(task.database, landmark_map, manifest.entries())
     return MapRun(landmark_map, StageRun(stage.name, "ran", reason, Outcome()), tuple(logs))
+
+
+def _named(logs: Sequence[MappedLog]) -> str:
+    """Logs as a reduction counts them."""
+    if len(logs) == 1:
+        return str(logs[0].recording)
+    return ", ".join(f"log {number} ({log.recording})" for number, log in enumerate(logs, 1))
+
+
+def _found_by(logs: Sequence[MappedLog]) -> str:
+    """What the stages before found in all logs, which tells where it went wrong; nothing where none had to run."""
+    found = Counter[str]()
+    for run in (run for log in logs for run in log.stages):
+        found[run.stage] += sum(run.outcome.counts.values())
+    told = ", ".join(f"{stage} {count}" for stage, count in found.items())
+    return f" (objects found: {told})" if told else ""
 
 
 def _collect(

@@ -16,7 +16,7 @@ from toolkit.recording.association import WINDOW_NS
 from toolkit.runs.bench import Bench, Watch, open_bench, unwatched
 from toolkit.runs.bundles import Reading, inputs_of, read_bundles
 from toolkit.runs.plan import Request, Step, missing_stages, plan
-from toolkit.runs.step import bundle_count, counted
+from toolkit.runs.step import bundle_count, counted, naming
 from toolkit.stage import Omission, Stamped
 from toolkit.stages import find_stage
 
@@ -84,7 +84,7 @@ def _results(bench: Bench, step: Step, reading: Reading, watch: Watch) -> Genera
         raws = counted(raws, inputs, step.stage.reads[0], progress)
         bundles = read_bundles(raws, inputs, step.stage.reads, reading)
         try:
-            yield from step.stage.process(bundles, step.config, step.files)
+            yield from naming(view.path, step.stage.process(bundles, step.config, step.files))
         finally:
             reading.close(view.losses)
 

@@ -11,7 +11,7 @@ from toolkit.manifest import RECORDING, StageRecord, code_hash, file_hash, narro
 from toolkit.recording.reader import Recording
 from toolkit.runs.bundles import Span
 from toolkit.runs.config import Settings, effective, load_files
-from toolkit.runs.inputs import ROLES, Choice, choose
+from toolkit.runs.inputs import ROLES, Choice, choose, could_be
 from toolkit.runs.thinning import Thinning
 from toolkit.runs.view import View, own_layer, result_layers
 from toolkit.stage import Channel, Reduction, Stage
@@ -73,13 +73,17 @@ class Log:
         self.fingerprint = narrowed(recording.fingerprint(), start_ns=span.start_ns, end_ns=span.end_ns)
         self.choice = span.choice
 
+    def view(self) -> View:
+        """Its own messages."""
+        return View(self.path, [self.own])
+
     def has(self, channel: Channel[Any]) -> bool:
         """Whether the recording has messages of its own for a channel.
 
         Raises:
             UsageError: several topics could be meant.
         """
-        view = View(self.path, [self.own])
+        view = self.view()
         counts = {entry.connection: entry.count for entry in view.channels}
         return sum(counts[connection] for connection in choose(view, channel, self.choice)) > 0
 
@@ -113,17 +117,21 @@ def missing_stages(stage: Stage | Reduction, log: Log) -> list[str]:
             names += [name for name in _chain_to(producer, log) if name not in names]
         except _LackingError as error:
             if producer.name not in log.results:
-                raise _LackingError(log.path, channel, error.source) from None
+                raise _LackingError(log, channel, error.source) from None
     return names
 
 
 class _LackingError(RecordingError):
     """A log has neither a channel nor its source, which it could be made from."""
 
-    def __init__(self, path: Path, channel: Channel[Any], source: Channel[Any]) -> None:
+    def __init__(self, log: Log, channel: Channel[Any], source: Channel[Any]) -> None:
+        remedy = (
+            f"choose topics with --remap or {ROLES[source].option if source in ROLES else '--remap'}, or take a log "
+            "that has one of them"
+        )
         super().__init__(
-            f"{path}: there is no {_name(channel)}, and no {_name(source)} to make it from; choose topics with --remap "
-            f"or {ROLES[source].option if source in ROLES else '--remap'}, or take a log that has one of them"
+            f"{log.path}: there is no {_name(channel)}, and no {_name(source)} to make it from; "
+            f"{could_be(log.view(), source) or remedy}"
         )
         self.source = source
 
@@ -132,7 +140,7 @@ def _chain_to(producer: Stage, log: Log) -> list[str]:
     """The missing stages up to one and that one itself."""
     chain, primary = [*missing_stages(producer, log), producer.name], producer.reads[0]
     if not primary.topic.startswith(_OURS) and not log.has(primary):
-        raise _LackingError(log.path, primary, primary)
+        raise _LackingError(log, primary, primary)
     return chain
 
 

@@ -34,7 +34,7 @@ def run_step(step: Step, view: View, span: Span, thinning: Thinning, target: Pat
     with create_recording(target) as writer:
         raws = _raws(stage, view, inputs, span, thinning, reading, progress)
         bundles = read_bundles(raws, inputs, stage.reads, reading)
-        for result in _naming(view.path, stage.process(bundles, step.config, step.files)):
+        for result in naming(view.path, stage.process(bundles, step.config, step.files)):
             if isinstance(result, Omission):
                 _omit(result, primary, reading)
             elif result.channel in writes:
@@ -93,12 +93,12 @@ def _raws(
     return chain(held_before(view, inputs, span.start_ns), raws)
 
 
-def _naming(path: Path, results: Iterator[Stamped | Omission]) -> Iterator[Stamped | Omission]:
+def naming(path: Path, results: Iterator[Stamped | Omission]) -> Iterator[Stamped | Omission]:
     """Results of a stage, which does not know where they come from; what it complains of gets the path of the log."""
     try:
         yield from results
-    except RecordingError as error:
-        raise RecordingError(f"{path}: {error}") from error
+    except (RecordingError, UsageError) as error:
+        raise type(error)(f"{path}: {error}") from error
 
 
 def _omit(omission: Omission, primary: Connection, reading: Reading) -> None:
