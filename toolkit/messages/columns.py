@@ -57,9 +57,7 @@ class Numbers:
         """See `Rows`."""
         count = self.count
         if count is None:
-            position = (position + 3) & -4
-            (count,) = _LENGTH.unpack_from(data, position)
-            position += 4
+            count, position = _length(data, position)
             self.counts.append(count)
             count *= self.width
             if not count:  # nothing follows, not even padding
@@ -112,10 +110,8 @@ class Text:
 
     def read(self, data: bytes, position: int) -> int:
         """See `Rows`."""
-        position = (position + 3) & -4
-        (length,) = _LENGTH.unpack_from(data, position)
-        position += 4 + length
-        self.found.append(data[position - length : position - 1] if length else b"")
+        text, position = _text(data, position)
+        self.found.append(text)
         return position
 
     def take(self, _rows: int, table: Table) -> None:
@@ -136,15 +132,11 @@ class Texts:
         """See `Rows`."""
         count = self.count
         if count is None:
-            position = (position + 3) & -4
-            (count,) = _LENGTH.unpack_from(data, position)
-            position += 4
+            count, position = _length(data, position)
         self.counts.append(count)
         for _ in range(count):
-            position = (position + 3) & -4
-            (length,) = _LENGTH.unpack_from(data, position)
-            position += 4 + length
-            self.found.append(data[position - length : position - 1] if length else b"")
+            text, position = _text(data, position)
+            self.found.append(text)
         return position
 
     def take(self, _rows: int, table: Table) -> None:
@@ -166,9 +158,7 @@ class Children:
         """See `Rows`."""
         count = self.count
         if count is None:
-            position = (position + 3) & -4
-            (count,) = _LENGTH.unpack_from(data, position)
-            position += 4
+            count, position = _length(data, position)
         if count > len(data):  # every element takes a byte at least
             raise MessageError(f"{self.path} claims {count} elements in {len(data)} bytes")
         self.counts.append(count)
@@ -207,6 +197,18 @@ class Rows:
         for part in self.parts:
             part.take(rows, table)
         return table
+
+
+def _length(data: bytes, position: int) -> tuple[int, int]:
+    """The length that stands at a position or after the padding there, and where it ends."""
+    position = (position + 3) & -4
+    return _LENGTH.unpack_from(data, position)[0], position + 4
+
+
+def _text(data: bytes, position: int) -> tuple[bytes, int]:
+    """The text at a position, without the zero at its end, and where it ends."""
+    length, position = _length(data, position)
+    return data[position : position + length - 1] if length else b"", position + length
 
 
 def _objects(found: list[bytes]) -> NDArray[np.object_]:
