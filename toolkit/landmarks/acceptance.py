@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import gammaln
 
-from toolkit.messages.scene import Hypotheses
+from toolkit.messages.hypotheses import Hypotheses
 
 Array = NDArray[np.float64]
 

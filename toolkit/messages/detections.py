@@ -5,8 +5,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from toolkit.messages.parts import Array, header_to_ros, make, pose_with_covariance_to_ros, stamp_from_ros
-from toolkit.messages.scene import Hypotheses
+from toolkit.messages.hypotheses import Hypotheses, hypotheses_from_ros, place_to_ros, results_to_ros
+from toolkit.messages.parts import Array, header_to_ros, make, stamp_from_ros
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,17 +27,10 @@ class Detections:
     def to_ros(self) -> Any:
         """See `Message`."""
         header = header_to_ros(self.stamp_ns, self.frame_id)
-        nowhere = pose_with_covariance_to_ros((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), np.zeros((6, 6)))
+        nowhere = place_to_ros(np.zeros(2), np.zeros((2, 2)))
         detections = []
         for box, options, name in zip(self.boxes_xyxy, self.hypotheses, self.ids, strict=True):
-            results = [
-                make(
-                    "vision_msgs/ObjectHypothesisWithPose",
-                    hypothesis=make("vision_msgs/ObjectHypothesis", class_id=class_id, score=score),
-                    pose=nowhere,
-                )
-                for class_id, score in options
-            ]
+            results = results_to_ros(options, [nowhere] * len(options))
             detections.append(
                 make("vision_msgs/Detection2D", header=header, results=results, bbox=_box_to_ros(box), id=name)
             )
@@ -58,10 +51,7 @@ class Detections:
             stamp_from_ros(ros.header.stamp),
             ros.header.frame_id,
             tuple(detection.id for detection in ros.detections),
-            tuple(
-                tuple((result.hypothesis.class_id, float(result.hypothesis.score)) for result in detection.results)
-                for detection in ros.detections
-            ),
+            tuple(hypotheses_from_ros(detection) for detection in ros.detections),
             boxes,
         )
 

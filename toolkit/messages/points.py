@@ -89,7 +89,8 @@ class PointCloud2:
         points = _points(ros, layout, [fields[name].offset for name in layout])
         xyz = np.stack([np.asarray(points[name], dtype=np.float32) for name in "xyz"], axis=1)
         stamp_ns = stamp_from_ros(ros.header.stamp)
-        times_ns = _times_ns(points[timed[0]], np.isfinite(xyz).all(axis=1), stamp_ns) if len(timed) == 1 else None
+        returned = np.array(np.isfinite(xyz).all(axis=1), dtype=np.bool_)
+        times_ns = _times_ns(points[timed[0]], returned, stamp_ns) if len(timed) == 1 else None
         return cls(stamp_ns, ros.header.frame_id, xyz, times_ns)
 
 

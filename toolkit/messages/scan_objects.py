@@ -5,17 +5,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from toolkit.messages.parts import (
-    Array,
-    header_to_ros,
-    make,
-    pose_to_ros,
-    pose_with_covariance_to_ros,
-    stamp_from_ros,
-)
-from toolkit.messages.scene import Hypotheses
-
-_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+from toolkit.messages.hypotheses import Hypotheses, hypotheses_from_ros, object_to_ros, place_to_ros, results_to_ros
+from toolkit.messages.parts import Array, header_to_ros, make, stamp_from_ros
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,27 +42,10 @@ class ScanObjects:
         )
 
     def _object_to_ros(self, header: Any, i: int) -> Any:
-        results = []
-        for (name, score), (x, y), covariance in zip(
-            self.hypotheses[i], self.positions_xy[i].tolist(), self.covariances[i], strict=True
-        ):
-            spread = np.zeros((6, 6))
-            spread[:2, :2] = covariance
-            results.append(
-                make(
-                    "vision_msgs/ObjectHypothesisWithPose",
-                    hypothesis=make("vision_msgs/ObjectHypothesis", class_id=name, score=score),
-                    pose=pose_with_covariance_to_ros((x, y, 0.0), _UPRIGHT, spread),
-                )
-            )
-        middle = (*self.positions_xy[i][-1].tolist(), 0.0) if results else (0.0, 0.0, 0.0)
-        extent = float(self.extents_m[i])
-        box = make(
-            "vision_msgs/BoundingBox3D",
-            center=pose_to_ros(middle, _UPRIGHT),
-            size=make("geometry_msgs/Vector3", x=extent, y=extent, z=0.0),
-        )
-        return make("vision_msgs/Detection3D", header=header, results=results, bbox=box, id=self.ids[i])
+        places = [place_to_ros(*place) for place in zip(self.positions_xy[i], self.covariances[i], strict=True)]
+        results = results_to_ros(self.hypotheses[i], places)
+        middle = self.positions_xy[i][-1].tolist() if results else (0.0, 0.0)
+        return object_to_ros(header, self.ids[i], results, middle, float(self.extents_m[i]))
 
     @classmethod
     def from_ros(cls, ros: Any) -> Self:
@@ -79,7 +53,7 @@ class ScanObjects:
         hypotheses, positions, covariances = [], [], []
         for detection in ros.detections:
             results = detection.results
-            hypotheses.append(tuple((one.hypothesis.class_id, float(one.hypothesis.score)) for one in results))
+            hypotheses.append(hypotheses_from_ros(detection))
             points = [(one.pose.pose.position.x, one.pose.pose.position.y) for one in results]
             spreads = [np.asarray(one.pose.covariance, dtype=np.float64).reshape(6, 6)[:2, :2] for one in results]
             positions.append(np.array(points, dtype=np.float64).reshape(-1, 2))

@@ -5,17 +5,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from toolkit.messages.parts import (
-    Array,
-    header_to_ros,
-    make,
-    pose_to_ros,
-    pose_with_covariance_to_ros,
-    stamp_from_ros,
-)
-
-Hypotheses = tuple[tuple[str, float], ...]
-_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+from toolkit.messages.hypotheses import Hypotheses, hypotheses_from_ros, object_to_ros, place_to_ros, results_to_ros
+from toolkit.messages.parts import Array, header_to_ros, make, stamp_from_ros
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,25 +46,9 @@ class SceneObjects:
         )
 
     def _object_to_ros(self, header: Any, i: int) -> Any:
-        position = (*self.positions_xy[i].tolist(), 0.0)
-        spread = np.zeros((6, 6))
-        spread[:2, :2] = self.covariances[i]
-        diameter = 2 * float(self.radii_m[i])
-        pose = pose_with_covariance_to_ros(position, _UPRIGHT, spread)
-        results = [
-            make(
-                "vision_msgs/ObjectHypothesisWithPose",
-                hypothesis=make("vision_msgs/ObjectHypothesis", class_id=name, score=score),
-                pose=pose,
-            )
-            for name, score in self.hypotheses[i]
-        ]
-        box = make(
-            "vision_msgs/BoundingBox3D",
-            center=pose_to_ros(position, _UPRIGHT),
-            size=make("geometry_msgs/Vector3", x=diameter, y=diameter, z=0.0),
-        )
-        return make("vision_msgs/Detection3D", header=header, results=results, bbox=box, id=self.ids[i])
+        place = place_to_ros(self.positions_xy[i], self.covariances[i])
+        results = results_to_ros(self.hypotheses[i], [place] * len(self.hypotheses[i]))
+        return object_to_ros(header, self.ids[i], results, self.positions_xy[i].tolist(), 2 * float(self.radii_m[i]))
 
     @classmethod
     def from_ros(cls, ros: Any) -> Self:
@@ -90,10 +65,7 @@ class SceneObjects:
             stamp_from_ros(ros.header.stamp),
             ros.header.frame_id,
             tuple(detection.id for detection in detections),
-            tuple(
-                tuple((result.hypothesis.class_id, float(result.hypothesis.score)) for result in detection.results)
-                for detection in detections
-            ),
+            tuple(hypotheses_from_ros(detection) for detection in detections),
             positions,
             covariances,
             np.array([detection.bbox.size.x / 2 for detection in detections], dtype=np.float64),

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from toolkit.messages.scene import Hypotheses
+from toolkit.messages.hypotheses import Hypotheses
 from toolkit.vision.classifier import Classifier
 from toolkit.vision.pixels import Rgb
 
