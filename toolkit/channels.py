@@ -40,4 +40,9 @@ TRUTH_POSE = Channel("/ground_truth/pose", PoseStamped)
 TRUTH_OBJECTS = Channel("/ground_truth/objects", SceneObjects)
 TRUTH_DETECTIONS = Channel("/ground_truth/detections", Detections)
 
+RESULTS, TRUTH = "/landmarks/", "/ground_truth/"
+"""What the topics of results and of the generator's truth begin with."""
+NO_SCENES = frozenset({SCAN_OBJECTS.topic, MAP.topic, TRUTH_OBJECTS.topic})
+"""Topics of ours whose messages are of the scenes' type, but are none."""
+
 MAP_FRAME, ODOM_FRAME, BASE_FRAME = "map", "odom", "base_footprint"

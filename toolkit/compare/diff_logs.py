@@ -25,7 +25,6 @@ HELD_BYTES = 1 << 23
 """So much of both recordings is held before it is compared."""
 PARTNER_NS = 10 * 10**9
 """How much later in log time than a message its partner may come."""
-ToleranceOf = Callable[[str, str], Tolerance]
 Connections = Sequence[Connection]
 _STAMP = Struct("<iI")
 

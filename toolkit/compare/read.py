@@ -6,7 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from toolkit.channels import MAP, MAP_POSE, MATCH, POSE, POSE_COVARIANCE, SCENE_OBJECTS, TRUTH_OBJECTS, TRUTH_POSE
+from toolkit.channels import (
+    MAP,
+    MAP_POSE,
+    MATCH,
+    NO_SCENES,
+    POSE,
+    POSE_COVARIANCE,
+    SCENE_OBJECTS,
+    TRUTH_OBJECTS,
+    TRUTH_POSE,
+)
 from toolkit.compare import tum
 from toolkit.compare.collected import ONCE, Collected
 from toolkit.compare.metrics import NOWHERE, Outcome, Reference
@@ -115,7 +125,6 @@ def _connections(recording: Recording, channels: tuple[Channel[Any], ...]) -> di
 
 def _foreign_scenes(recording: Recording) -> dict[Connection, Channel[Any]]:
     """The one topic of scene objects that somebody else wrote, if there is one."""
-    own = {MAP.topic, TRUTH_OBJECTS.topic, "/landmarks/scan_objects"}
     found = [entry.connection for entry in recording.channels if entry.connection.message_type == SceneObjects.ROS_TYPE]
-    foreign = [connection for connection in found if connection.topic not in own]
+    foreign = [connection for connection in found if connection.topic not in NO_SCENES]
     return {foreign[0]: SCENE_OBJECTS} if len(foreign) == 1 else {}

@@ -46,11 +46,6 @@ def planar(dst_from_src: Array) -> Array:
     return np.array([dst_from_src[0, 3], dst_from_src[1, 3], np.arctan2(dst_from_src[1, 0], dst_from_src[0, 0])])
 
 
-def is_upside_down(dst_from_src: Array) -> bool:
-    """Whether src's z axis points down in dst: a planar LiDAR mounted so turns the other way."""
-    return bool(dst_from_src[2, 2] < 0)
-
-
 def plain(name: str) -> str:
     """A frame's name without the leading slash that ROS 1 gave it."""
     return name.lstrip("/")

@@ -17,10 +17,6 @@ from toolkit.messages.transforms import TFMessage
 from toolkit.runs.view import Readable
 from toolkit.stage import Channel, Connection
 
-_NO_INPUTS = ("/landmarks/", "/ground_truth/")
-
-OWN_OBJECTS = frozenset({"/landmarks/scan_objects", channels.MAP.topic, channels.TRUTH_OBJECTS.topic})
-
 
 @dataclass(frozen=True, slots=True)
 class Role:
@@ -83,8 +79,8 @@ def topics_for(role: Role, present: Collection[tuple[str, str]]) -> list[str]:
     if role.name == "scene_objects":
         if channels.SCENE_OBJECTS.topic in fitting:
             return [channels.SCENE_OBJECTS.topic]
-        return [topic for topic in fitting if topic not in OWN_OBJECTS]
-    return [topic for topic in fitting if not topic.startswith("/landmarks/")]
+        return [topic for topic in fitting if topic not in channels.NO_SCENES]
+    return [topic for topic in fitting if not topic.startswith(channels.RESULTS)]
 
 
 def could_be(recording: Readable, channel: Channel[Any]) -> str:
@@ -94,7 +90,8 @@ def could_be(recording: Readable, channel: Channel[Any]) -> str:
         return ""
     others = {message.ROS_TYPE for message in role.others}
     topics = [entry.connection.topic for entry in recording.channels if entry.connection.message_type in others]
-    fitting = sorted({topic for topic in topics if not topic.startswith(_NO_INPUTS) and not topic.endswith("_static")})
+    recorded = {topic for topic in topics if not topic.startswith((channels.RESULTS, channels.TRUTH))}
+    fitting = sorted(topic for topic in recorded if not topic.endswith("_static"))
     how = "--scan-from TOPIC --slice ZMIN:ZMAX" if channel == channels.SCAN else f"{role.option} TOPIC"
     return f"{' or '.join(fitting)} could be it, choose with {how}" if fitting else ""
 

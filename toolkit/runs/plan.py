@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from toolkit.channels import CAMERA_IMAGE, ODOMETRY
+from toolkit.channels import CAMERA_IMAGE, ODOMETRY, RESULTS
 from toolkit.errors import RecordingError, UsageError
 from toolkit.manifest import RECORDING, StageRecord, code_hash, file_hash, narrowed
 from toolkit.recording.reader import Recording
@@ -16,8 +16,6 @@ from toolkit.runs.thinning import Thinning
 from toolkit.runs.view import View, own_layer, result_layers
 from toolkit.stage import Channel, Reduction, Stage
 from toolkit.stages import find_stage, stage_names
-
-_OURS = "/landmarks/"
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +106,7 @@ def missing_stages(stage: Stage | Reduction, log: Log) -> list[str]:
     """
     names: list[str] = []
     for channel in stage.reads:
-        if not channel.topic.startswith(_OURS) or log.has(channel):
+        if not channel.topic.startswith(RESULTS) or log.has(channel):
             continue
         producer = _producer(channel)
         if producer.name in log.results and not log.own.channels:
@@ -139,7 +137,7 @@ class _LackingError(RecordingError):
 def _chain_to(producer: Stage, log: Log) -> list[str]:
     """The missing stages up to one and that one itself."""
     chain, primary = [*missing_stages(producer, log), producer.name], producer.reads[0]
-    if not primary.topic.startswith(_OURS) and not log.has(primary):
+    if not primary.topic.startswith(RESULTS) and not log.has(primary):
         raise _LackingError(log, primary, primary)
     return chain
 
@@ -180,7 +178,7 @@ def in_order(names: Iterable[str]) -> list[str]:
 
 
 def _reads(stage: Stage, other: Stage) -> bool:
-    return any(channel in other.writes for channel in stage.reads if channel.topic.startswith(_OURS))
+    return any(channel in other.writes for channel in stage.reads if channel.topic.startswith(RESULTS))
 
 
 def plan(request: Request, log: Log, names: Sequence[str]) -> list[Step]:
@@ -213,7 +211,7 @@ def inputs_of_stage(stage: Stage | Reduction, log: Log, steps: Sequence[Step]) -
 
 def is_result(channel: Channel[Any], choice: Choice) -> bool:
     """Whether stages read a channel from results, where there are any."""
-    return channel.topic.startswith(_OURS) and channel.topic not in choice.remaps.values()
+    return channel.topic.startswith(RESULTS) and channel.topic not in choice.remaps.values()
 
 
 def record_of(
