@@ -99,6 +99,13 @@ def test_one_of_two_scans_or_both(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "two are the most" in capsys.readouterr().err
 
 
+def test_a_second_scan_that_is_missing_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    late = [stamped for i, stamped in enumerate(content(("/front", "/rear"))) if stamped.channel.topic != "/rear" or i > 9]
+    log, out = write(tmp_path / "log.mcap", late), tmp_path / "out.mcap"
+    assert call("cluster", log, "-o", out, "--scan", "/front", "--scan", "/rear") == 0
+    assert " bundles without /rear at their time" in capsys.readouterr().err
+
+
 def test_a_slice_of_a_point_cloud(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, out = write(tmp_path / "log.mcap", [*content((), 2), cloud()]), tmp_path / "out.mcap"
     assert call("cluster", log, "-o", out, "--scan-from", "/points", "--slice", "0.1:0.3") == 0

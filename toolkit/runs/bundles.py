@@ -38,6 +38,8 @@ class Reading:
     dropped: Counter[str] = field(default_factory=Counter)
     losses: list[str] = field(default_factory=list)
     unreadable: Counter[str] = field(default_factory=Counter)
+    topics: dict[str, str] = field(default_factory=dict)
+    """The log's own topic for a channel's."""
 
     def lose(self, topic: str, log_time_ns: int, reason: str) -> None:
         """Count a message that cannot be read; the first of a topic is told in full."""
@@ -62,9 +64,9 @@ class Reading:
         found["odometry messages whose time goes backwards"] += association.odometry_out_of_order
         found["odometry messages with numbers that are not finite"] += association.odometry_not_finite
         for topic, count in association.alone.items():
-            found[f"bundles without {topic} at their time"] += count
+            found[f"bundles without {self.topics.get(topic, topic)} at their time"] += count
         for topic, count in association.unpaired.items():
-            found[f"messages of {topic} that were nearest to no bundle"] += count
+            found[f"messages of {self.topics.get(topic, topic)} that were nearest to no bundle"] += count
         return {reason: count for reason, count in sorted(found.items()) if count}
 
 
@@ -118,6 +120,7 @@ def read_bundles(
 
     A message that cannot be decoded is a loss, an unusable object is dropped; both are counted.
     """
+    reading.topics.update({channel.topic: connection.topic for connection, channel in inputs.items()})
     present = {*inputs.values()} | {TF_STATIC for entry in inputs if entry.message_type == TFMessage.ROS_TYPE}
     others = [channel for channel in reads[1:] if channel != ODOMETRY and channel in present]
     return associate(
