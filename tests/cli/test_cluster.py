@@ -100,7 +100,9 @@ def test_one_of_two_scans_or_both(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def test_a_second_scan_that_is_missing_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    late = [stamped for i, stamped in enumerate(content(("/front", "/rear"))) if stamped.channel.topic != "/rear" or i > 9]
+    late = [
+        stamped for i, stamped in enumerate(content(("/front", "/rear"))) if stamped.channel.topic != "/rear" or i > 9
+    ]
     log, out = write(tmp_path / "log.mcap", late), tmp_path / "out.mcap"
     assert call("cluster", log, "-o", out, "--scan", "/front", "--scan", "/rear") == 0
     assert " bundles without /rear at their time" in capsys.readouterr().err

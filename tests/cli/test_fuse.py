@@ -82,9 +82,7 @@ def test_scenes_stand_beside_what_the_log_has(tmp_path: Path, capsys: pytest.Cap
 
 
 @pytest.mark.parametrize("source", ["tf", "pose"])
-def test_odometry_may_be_transforms_or_poses(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], source: str
-) -> None:
+def test_odometry_may_be_transforms_or_poses(tmp_path: Path, capsys: pytest.CaptureFixture[str], source: str) -> None:
     found: list[Stamped] = []
     poses = Channel("/tracked", PoseStamped)
     for stamped in messages():

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from toolkit.atomic import check_target
-from toolkit.errors import UsageError
+from toolkit.errors import RecordingError, UsageError
 
 
 def output_files(inputs: Sequence[Path], output: Path) -> dict[Path, Path]:
@@ -34,9 +34,14 @@ def make_folder(folder: Path) -> None:
 
     Raises:
         UsageError: the parent does not exist, or the name belongs to a file.
+        RecordingError: it may not be made there.
     """
     if not folder.parent.is_dir():
         raise UsageError(f"{folder}: the folder {folder.parent} does not exist; create it first")
     if folder.exists() and not folder.is_dir():
         raise UsageError(f"{folder} is a file; several outputs need a folder")
-    folder.mkdir(exist_ok=True)
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise RecordingError(f"{folder}: cannot be made ({reason}); choose another place with -o") from error
