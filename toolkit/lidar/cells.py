@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from toolkit.geometry.se2 import Array
 from toolkit.lidar.palette import Floats, Palette
-from toolkit.lidar.windows import Windows
+from toolkit.lidar.windows import Rays
 
 SURFACE_M = 0.002
 """How far real outlines are off their shapes."""
@@ -15,6 +15,7 @@ _KEPT = 16
 _CLEAR_M = 0.05
 """A beam that ends no more than this behind a surface may have met it."""
 _STRAY_RANGE_M = 0.5
+_FAR_M = 1e3
 _OUTLIER_M = 0.1
 """A hit that is so far off the outline does not say where it is."""
 _BLUR = 0.6
@@ -58,22 +59,25 @@ class Cells:
         return blur
 
 
-def first_cells(window: Windows, shapes: Palette) -> Cells:
-    """A coarse grid of all that the outermost hits allow; either all shapes are round or none."""
-    is_round, sized = bool((shapes.turn_rad == 0).all()), shapes.span_m > 0
-    fixed = _grid(24, 1, 1) if is_round else _grid(8, 16, 1)
-    x, t, s = np.where(sized[:, None, None], _grid(8, 8, 2) if sized.any() else fixed, fixed).swapaxes(0, 1)
-    low, high = window.lateral_m[:, 1] - shapes.reach_m, window.lateral_m[:, 0] + shapes.reach_m
+def first_cells(lateral_m: Array, shapes: Palette) -> Cells:
+    """A coarse grid of all that the outermost hits (R, 2) allow, for shapes that are all round, or of one size, or none
+    of either."""
+    across, turns, sizes = 8, 16, 1
+    if shapes.turn_rad[0] == 0:
+        across, turns = 24, 1
+    elif shapes.span_m[0] > 0:
+        turns, sizes = 8, 2
+    x, t, s = _grid(across, turns, sizes)
+    low, high = lateral_m[:, 1] - shapes.reach_m, lateral_m[:, 0] + shapes.reach_m
     low, high = np.minimum(low, high) - SURFACE_M, np.maximum(low, high) + SURFACE_M
-    half_turn = shapes.turn_rad / (2 if is_round else np.where(sized, 16, 32))
     parts: tuple[Array, ...] = (
-        np.broadcast_to(0.7 * shapes.reach_m[:, None], x.shape),
+        np.repeat(0.7 * shapes.reach_m[:, None], len(x), axis=1),
         low[:, None] + (high - low)[:, None] * x,
         shapes.turn_rad[:, None] * t,
-        s,
-        (high - low) / (48 if is_round else 16),
-        half_turn,
-        np.where(sized, 0.25, 0.5),
+        np.repeat(s[None], len(low), axis=0),
+        (high - low) / (2 * across),
+        shapes.turn_rad / (2 * turns),
+        np.full(len(low), 0.5 / sizes),
     )
     return Cells(*(part.astype(np.float32) for part in parts))
 
@@ -87,22 +91,23 @@ def _grid(across: int, turns: int, sizes: int) -> Array:
 def finer(cells: Cells, rows: NDArray[np.intp], log_weights: Array) -> Cells:
     """The best cells of some rows, each cut up: into four across and by turn, into two by size."""
     best = np.argpartition(-log_weights[rows], _KEPT - 1, axis=1)[:, :_KEPT]
-    is_round, sized = bool((cells.half_turn_rad == 0).all()), bool((cells.half_size < 0.5).any())
-    x, t, s = (2 * _grid(4, 1 if is_round else 4, 2 if sized else 1) - 1).astype(np.float32)
+    turns, sizes = 4 if cells.half_turn_rad[0] > 0 else 1, 2 if cells.half_size[0] < 0.5 else 1
+    x, t, s = (2 * _grid(4, turns, sizes) - 1).astype(np.float32)
 
-    def cut(middles: Floats, halves: Floats, shift: Floats) -> Floats:
-        chosen = middles[rows[:, None], best][:, :, None]
-        return (chosen + halves[rows, None, None] * shift).reshape(len(rows), -1)
+    across, turn, size = cells.half_across_m[rows], cells.half_turn_rad[rows], cells.half_size[rows]
 
-    size = np.where(cells.half_size < 0.5, cells.half_size, np.float32(0))
+    def cut(middles: Floats, halves: Floats, places: Floats) -> Floats:
+        shifts = halves[:, None, None] * places
+        return (middles[rows[:, None], best][:, :, None] + shifts).reshape(len(rows), -1)
+
     return Cells(
-        cut(cells.away_m, size, np.zeros_like(s)),
-        cut(cells.across_m, cells.half_across_m, x),
-        cut(cells.turn_rad, cells.half_turn_rad, t),
+        cut(cells.away_m, across, 0 * x),
+        cut(cells.across_m, across, x),
+        cut(cells.turn_rad, turn, t),
         cut(cells.size, size, s),
-        (cells.half_across_m[rows] / 4).astype(np.float32),
-        (cells.half_turn_rad[rows] / 4).astype(np.float32),
-        np.where(cells.half_size < 0.5, cells.half_size / 2, cells.half_size)[rows] if sized else cells.half_size[rows],
+        across / np.float32(4),
+        turn / np.float32(turns),
+        size / np.float32(sizes),
     )
 
 
@@ -111,45 +116,50 @@ def sharp(noise: Noise) -> float:
     return noise.sigma_m**2 + SURFACE_M**2
 
 
-def weigh(window: Windows, cells: Cells, shapes: Palette, noise: Noise, passes: int) -> tuple[Cells, Array, Floats]:
+def weigh(
+    rays: tuple[Rays, Rays], cells: Cells, shapes: Palette, noise: Noise, passes: int
+) -> tuple[Cells, Array, Floats]:
     """The cells at their best distances, the logarithm of their weights, and how many hits these rest on (R, K).
 
-    A hit counts by how much its range changes with that distance: one along the view fully, one across it not at all.
-
-    Every pass but the last moves the cells to where their hits are; the last one settles what remains.
+    `rays` are the hits, and the beams that pass. A hit counts by how much its range changes with that distance: one
+    along the view fully, one across it not at all. Every pass but the last moves the cells to where their hits are; the
+    last one settles what remains.
     """
+    (hits, others), rows = rays, len(cells.across_m)
     fine, blur = sharp(noise), cells.blur_m2(shapes)
-    variance = (fine + blur).astype(np.float32)[:, None, None]
+    variance = (fine + blur).astype(np.float32)[hits.row, None]
     stray = 2 * np.float32(np.log(_STRAY_RANGE_M / noise.stray)) - np.log(np.float32(2 * np.pi) * variance)
-    hit, ranges, along = window.is_hit[:, None, :], window.ranges_m[:, None, :], window.directions[:, None, :, 0]
     for left in reversed(range(passes)):
-        predicted = _cast(window, cells, shapes)
-        off = np.where(hit, ranges - predicted, np.float32(-np.inf))
-        used = np.abs(off) < (np.inf if left else _OUTLIER_M)
-        number = np.maximum((used * along**2).sum(axis=2), np.float32(1e-3))
-        shift = (np.where(used, off, np.float32(0)) * along).sum(axis=2) / number
+        off = hits.ranges_m - _cast(hits, cells, shapes)
+        used = (np.abs(off) < (_FAR_M if left else _OUTLIER_M)).astype(np.float32)
+        used *= hits.ahead
+        number = hits.sums(used * hits.ahead, rows).clip(np.float32(1e-3))
+        shift: Floats = hits.sums(used * off, rows) / number
         cells = replace(cells, away_m=cells.away_m + shift)
-    moved = shift[..., None] * along
-    squared = np.where(hit, np.minimum((off - moved) ** 2 / variance, stray), np.float32(0)).sum(axis=2)
-    missed = ((predicted + moved < ranges - np.float32(_CLEAR_M)) & ~hit).sum(axis=2)
-    hits = window.is_hit.sum(axis=1)[:, None]
+    off -= shift[hits.row] * hits.ahead
+    off *= off
+    off /= variance
+    squared = hits.sums(np.minimum(off, stray, out=off), rows)
+    met = _cast(others, cells, shapes) < others.ranges_m - np.float32(_CLEAR_M)
+    missed = others.sums(met.astype(np.float32), rows)
+    count = np.bincount(hits.row)[:, None]
     log_weights = np.log(noise.dropout) * np.sqrt(fine / (fine + blur))[:, None] * missed - 0.5 * squared
-    log_weights += 0.5 * (1 - hits) * np.log(2 * np.pi * (fine + blur))[:, None] - 0.5 * np.log(number)
+    log_weights += 0.5 * (1 - count) * np.log(2 * np.pi * (fine + blur))[:, None] - 0.5 * np.log(number)
     turn = np.where(shapes.turn_rad > 0, 2 * cells.half_turn_rad / np.maximum(shapes.turn_rad, 1e-9), 1.0)
     log_weights += np.log(2 * cells.half_across_m * turn * 2 * cells.half_size)[:, None]
     return cells, log_weights, number
 
 
-def _cast(window: Windows, cells: Cells, shapes: Palette) -> Floats:
-    """The range (R, K, B) at which each beam meets the shape in each cell, inf where it passes."""
-    ahead, left = window.directions[:, None, :, 0], window.directions[:, None, :, 1]
-    x, y = cells.away_m[..., None], cells.across_m[..., None]
-    offset = ahead * y
-    offset -= left * x
-    offset += window.offset_m[:, None, :]
-    heading = window.headings_rad[:, None, :] - cells.turn_rad[..., None]
-    predicted = shapes.look_up(heading, offset, cells.size)
-    predicted += ahead * x
-    predicted += left * y
-    predicted += window.abreast_m[:, None, :]
+def _cast(rays: Rays, cells: Cells, shapes: Palette) -> Floats:
+    """The range (P, K) at which each beam meets the shape in each cell of its row, very far where it passes."""
+    x, y = cells.away_m[rays.row], cells.across_m[rays.row]
+    offset = rays.ahead * y
+    offset -= rays.left * x
+    offset += rays.offset_m
+    predicted = shapes.look_up(rays.row, rays.headings_rad - cells.turn_rad[rays.row], offset, cells.size)
+    x *= rays.ahead
+    y *= rays.left
+    predicted += x
+    predicted += y
+    predicted += rays.abreast_m
     return predicted

@@ -52,9 +52,9 @@ def centres(
         np.broadcast_to(np.eye(2), (*many, 2, 2)).copy(),
     )
     clusters, which = np.nonzero(_possible(window, known) & (True if allowed is None else allowed))
-    is_round = known.turn_rad[which] == 0
-    groups = [(clusters[rows], which[rows]) for rows in (is_round, ~is_round) if rows.any()]
-    searches = [_Search(window, known, rows, noise, found) for rows in groups]
+    is_round, has_sizes = known.turn_rad[which] == 0, known.span_m[which] > 0
+    alike = [np.flatnonzero(rows) for rows in (is_round, has_sizes, ~is_round & ~has_sizes)]
+    searches = [_Search(window, known, clusters[rows], which[rows], noise, found) for rows in alike if len(rows)]
     surely = found.log_evidence.max(axis=1, initial=-np.inf)
     for search in searches:
         search.refine(surely - _HOPELESS)
@@ -64,11 +64,12 @@ def centres(
 def _possible(window: Windows, shapes: Palette) -> NDArray[np.bool_]:
     """Whether clusters (C, S) are no wider than the shapes, and no narrower where beams pass them on both sides."""
     width = (window.lateral_m[:, 1] - window.lateral_m[:, 0])[:, None]
-    beside = (window.beside_m > 0) & (window.beside_m <= 1.5 * window.spacing_m[:, None])
-    behind = window.ranges_m - window.abreast_m
-    passed = (beside[:, None] & (behind[:, None] > shapes.reach_m[:, None])).sum(axis=2) > 1
+    beside = (window.beside_m > 0) & (window.beside_m <= 1.5 * window.spacing_m[window.cluster])
+    behind = (window.ranges_m - window.abreast_m)[beside]
+    passed = np.zeros((len(window), len(shapes.reach_m)), dtype=np.int64)
+    np.add.at(passed, window.cluster[beside], behind[:, None] > shapes.reach_m)
     least = shapes.least_width_m - 3 * window.spacing_m[:, None] - _EDGE_M / 2
-    possible: NDArray[np.bool_] = (width <= 2 * shapes.reach_m + _EDGE_M) & ((width >= least) | ~passed)
+    possible: NDArray[np.bool_] = (width <= 2 * shapes.reach_m + _EDGE_M) & ((width >= least) | (passed < 2))
     return possible
 
 
@@ -79,23 +80,22 @@ class _Search:
         self,
         window: Windows,
         shapes: Palette,
-        rows: tuple[NDArray[np.intp], NDArray[np.intp]],
+        clusters: NDArray[np.intp],
+        which: NDArray[np.intp],
         noise: Noise,
         found: Centres,
     ) -> None:
-        self._clusters, self._which = rows
+        self._window, self._clusters, self._which = window, clusters, which
         self._found, self._noise = found, noise
-        self._shapes = shapes.rows(self._which)
-        self._window = window.within(self._clusters, 2 * self._shapes.reach_m)
-        self._cells = first_cells(self._window, self._shapes)
+        self._shapes = shapes.rows(which)
+        self._cells = first_cells(window.lateral_m[clusters], self._shapes)
         self._weigh(passes=2)
 
     def refine(self, least: Array) -> None:
         """Refine the grids of rows that could get their cluster's evidence of `least` (C,)."""
-        hits = self._window.is_hit.sum(axis=1)
         blur = np.log1p(self._cells.blur_m2(self._shapes) / sharp(self._noise))
         known = self._found.log_evidence[self._clusters, self._which]
-        hopeful = known + 0.5 * hits * blur >= least[self._clusters]
+        hopeful = known + 0.5 * self._window.hits[self._clusters] * blur >= least[self._clusters]
         for _ in range(_LEVELS):
             cells = 1 / (_shares(self._log_weights) ** 2).sum(axis=1)
             blurred = self._cells.blur_m2(self._shapes) > _BLURRED * sharp(self._noise)
@@ -103,13 +103,14 @@ class _Search:
             if not len(again):
                 return
             self._clusters, self._which = self._clusters[again], self._which[again]
-            self._shapes, self._window = self._shapes.rows(again), self._window.within(again, None)
+            self._shapes = self._shapes.rows(again)
             self._cells = finer(self._cells, again, self._log_weights)
             self._weigh(passes=1)
             hopeful = np.ones(len(again), dtype=np.bool_)
 
     def _weigh(self, passes: int) -> None:
-        self._cells, self._log_weights, hits = weigh(self._window, self._cells, self._shapes, self._noise, passes)
+        rays = self._window.rays(self._clusters, 2 * self._shapes.reach_m)
+        self._cells, self._log_weights, hits = weigh(rays, self._cells, self._shapes, self._noise, passes)
         rows = self._clusters, self._which
         _keep(
             self._found,
@@ -147,7 +148,7 @@ def _keep(
     spread[:, 0, 0] = (share * (away**2 + variance)).sum(axis=1) + SURFACE_M**2
     spread[:, 1, 1] = (share * across**2).sum(axis=1) + np.square(cells.half_across_m) / 3 + SURFACE_M**2
     spread[:, 0, 1] = spread[:, 1, 0] = (share * away * across).sum(axis=1)
-    turned = rotation(window.bearings_rad)
-    found.positions_xy[rows] = window.in_base(mean)
+    turned = rotation(window.bearings_rad[rows[0]])
+    found.positions_xy[rows] = window.in_base(rows[0], mean)
     found.covariances[rows] = turned @ spread @ np.swapaxes(turned, 1, 2)
     found.log_evidence[rows] = top + np.log(total)

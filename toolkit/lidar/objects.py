@@ -20,7 +20,7 @@ _OTHER = 0.1
 """How likely something of a class is not of the class's shapes."""
 _CRACK_M = 0.35
 """Segments that are no farther apart can be of one solid thing, whose hits between them were lost."""
-_LOG_PER_M2 = -3.0
+_LOG_PER_M2 = -3.7
 """Logarithm of objects per square metre where there are any: two side by side are less likely than one of two parts."""
 _FAR_M, _SURELY = 0.45, 4.0
 """Clusters farther apart become one only where the logarithm of the evidence gains more than this, not just any."""
@@ -146,10 +146,10 @@ class _Explainer:
 
     def _explain(self, clusters: Sequence[Cluster], allowed: NDArray[np.bool_]) -> None:
         window = windows(self._beams, clusters)
-        found = centres(window, self._shapes, self._noise, allowed)
+        found, hits = centres(window, self._shapes, self._noise, allowed), window.hits
         for i, cluster in enumerate(clusters):
             point, spread = _surface(self._beams, cluster, float(window.spacing_m[i]), self._noise)
-            nothing = np.log(window.spacing_m[i]) - (int(window.is_hit[i].sum()) - 1) * np.log(_UNKNOWN_M)
+            nothing = np.log(window.spacing_m[i]) - (hits[i] - 1) * np.log(_UNKNOWN_M)
             shaped = found.log_evidence[i, self._row] + np.log(1 - _OTHER)
             other = np.where(np.isfinite(shaped), np.log(_OTHER) + nothing, -np.inf)
             either = np.logaddexp(shaped, other)

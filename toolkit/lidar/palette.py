@@ -14,6 +14,9 @@ from toolkit.lidar.shapes import Shape, profile
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
 
+PAST_M = np.float32(1e5)
+"""The depth of rays that pass a shape: beyond every range, and finite."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Palette:
@@ -49,22 +52,21 @@ class Palette:
             least_width_m=self.least_width_m[which],
         )
 
-    def look_up(self, headings_rad: Floats, offsets_m: Floats, sizes: Floats) -> Floats:
-        """Depths (R, K, B) of rays that meet the shape of their row at headings and offsets; sizes (R, K) in 0 to 1."""
-        per_row = (slice(None), None, None)
-        last = (self.offsets - 1).astype(np.float32)[per_row]
-        place = offsets_m * (1 / self.steps_m)[per_row]
-        place += (self.offsets // 2 + np.float32(0.5)).astype(np.float32)[per_row]
-        index = np.clip(place, 0, last, out=place).astype(np.int32)
-        if (self.turns > 1).any():
-            turns = self.turns[per_row]
-            turn = (headings_rad * (turns / np.float32(2 * np.pi)).astype(np.float32) + np.float32(0.5)).astype(
-                np.int32
-            )
-            turn = np.where(turn < 0, turn + turns, turn)
-            index += np.minimum(turn, turns - 1) * self.offsets[per_row]
+    def look_up(self, row: NDArray[np.intp], headings_rad: Floats, offsets_m: Floats, sizes: Floats) -> Floats:
+        """Depths (P, K) of rays of rows (P,) that meet the shapes of these at headings and offsets (P, K), where the
+        shapes of rows have sizes (R, K) in 0 to 1; `PAST_M` where they pass them."""
+        count, turns = self.offsets[row, None], self.turns[row, None]
+        place = offsets_m * (1 / self.steps_m)[row, None]
+        place += (count // 2 + 0.5).astype(np.float32)
+        index = np.clip(place, 0, (count - 1).astype(np.float32), out=place).astype(np.int32)
+        if (turns > 1).any():
+            turned = headings_rad * np.float32(0.5 / np.pi)
+            turned += (0.5 / turns).astype(np.float32)
+            turned -= np.floor(turned)
+            turned *= turns.astype(np.float32)
+            index += np.minimum(turned.astype(np.int32), turns - 1) * count
         size = np.clip((sizes * self.sizes[:, None]).astype(np.int32), 0, self.sizes[:, None] - 1)
-        index += (size * (self.turns * self.offsets)[:, None] + self.starts[:, None])[..., None]
+        index += (size * (self.turns * self.offsets)[:, None] + self.starts[:, None])[row]
         return self.depths_m.take(index)
 
 
@@ -78,7 +80,7 @@ def _palette(shapes: tuple[Shape, ...]) -> Palette:
     profiles = [profile(shape) for shape in shapes]
     layout = np.array([one.depths_m.shape for one in profiles], dtype=np.int32).reshape(-1, 3)
     ends = np.cumsum(layout.prod(axis=1))
-    depths = [one.depths_m.ravel() for one in profiles]
+    depths = [np.minimum(one.depths_m, PAST_M).ravel() for one in profiles]
     sizes, turns, offsets = layout.T
     return Palette(
         np.concatenate(depths) if depths else np.zeros(0, dtype=np.float32),

@@ -19,19 +19,47 @@ _FAR_M = 1e4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Windows:
-    """C clusters with up to B beams each, in frames of their own: x away from the robot, y to the left.
+class Rays:
+    """P beams, each of one of R rows and those of a row side by side, in the frames of the rows' windows.
 
-    anchors_xy (C, 2) and bearings_rad (C,): those frames in the base frame, at the mean of the hits. Per beam (C, B):
-    headings_rad, and directions (C, B, 2), the same as unit vectors; abreast_m and offset_m, where the frame's origin
-    lies along the beam and to its left; ranges_m, very large where a beam met nothing; is_hit, whether it met this
-    object; beside_m, how far beyond the outermost hit of its side it passes (0 between hits). Where a cluster has fewer
-    beams, ranges are 0 and constrain nothing. lateral_m (C, 2): the rightmost and leftmost hit. spacing_m (C,): the
-    distance of neighbouring beams there.
+    row (P,); all else (P, 1), to stand beside what K cells of the row have: headings_rad, and ahead and left, the same
+    as a unit vector; abreast_m and offset_m, where the frame's origin lies along the beam and to its left; ranges_m.
+    """
+
+    row: NDArray[np.intp]
+    headings_rad: Floats
+    ahead: Floats
+    left: Floats
+    abreast_m: Floats
+    offset_m: Floats
+    ranges_m: Floats
+
+    def sums(self, values: Floats, rows: int) -> Floats:
+        """The sums (R, K) over the beams of each of `rows` rows of values (P, K)."""
+        total = np.zeros((rows, values.shape[1]), dtype=np.float32)
+        first = np.flatnonzero(np.diff(self.row, prepend=-1))
+        if len(first):
+            total[self.row[first]] = np.add.reduceat(values, first)
+        return total
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Windows:
+    """C clusters with B beams together, those of a cluster side by side, in frames of their own: x away from the robot,
+    y to the left.
+
+    anchors_xy (C, 2) and bearings_rad (C,): those frames in the base frame, at the mean of the hits. lateral_m (C, 2):
+    the rightmost and leftmost hit. spacing_m (C,): the distance of neighbouring beams there. Per beam (B,): cluster,
+    whose it is; headings_rad, and directions (B, 2), the same as unit vectors; abreast_m and offset_m, where the
+    frame's origin lies along the beam and to its left; ranges_m, very large where a beam met nothing; is_hit, whether
+    it met this object; beside_m, how far beyond the outermost hit of its side it passes (0 between hits).
     """
 
     anchors_xy: Array
     bearings_rad: Array
+    lateral_m: Array
+    spacing_m: Array
+    cluster: NDArray[np.intp]
     headings_rad: Floats
     directions: Floats
     abreast_m: Floats
@@ -39,75 +67,76 @@ class Windows:
     ranges_m: Floats
     is_hit: NDArray[np.bool_]
     beside_m: Floats
-    lateral_m: Array
-    spacing_m: Array
 
     def __len__(self) -> int:
         return len(self.anchors_xy)
 
-    def within(self, rows: NDArray[np.intp], reach_m: Array | None) -> "Windows":
-        """Some clusters, those that several rows ask for repeated, with the beams that pass near their outermost hits:
-        within distances (R,), or all of them."""
-        near = np.full((len(rows), 1), True) if reach_m is None else self.beside_m[rows] <= reach_m[:, None]
-        columns = np.flatnonzero((near & (self.ranges_m[rows] > 0)).any(axis=0))
-        pick = np.ix_(rows, columns)
-        return Windows(
-            self.anchors_xy[rows],
-            self.bearings_rad[rows],
-            self.headings_rad[pick],
-            self.directions[pick],
-            self.abreast_m[pick],
-            self.offset_m[pick],
-            np.where(near, self.ranges_m[rows], np.float32(0))[:, columns],
-            self.is_hit[pick],
-            self.beside_m[pick],
-            self.lateral_m[rows],
-            self.spacing_m[rows],
+    @property
+    def hits(self) -> NDArray[np.intp]:
+        """How many hits each cluster has (C,)."""
+        return np.bincount(self.cluster[self.is_hit], minlength=len(self))
+
+    def rays(self, clusters: NDArray[np.intp], reach_m: Array) -> tuple[Rays, Rays]:
+        """The hits, and the other beams, of the clusters of rows (R,); of the latter those that pass within distances
+        (R,) of their outermost hits."""
+        starts = np.searchsorted(self.cluster, np.arange(len(self) + 1))
+        many = np.diff(starts)[clusters]
+        row = np.repeat(np.arange(len(clusters)), many)
+        beam = np.arange(len(row)) + np.repeat(starts[clusters] - np.cumsum(many) + many, many)
+        is_hit = self.is_hit[beam]
+        others = ~is_hit & (self.beside_m[beam] <= reach_m[row])
+        return self._rays(row[is_hit], beam[is_hit]), self._rays(row[others], beam[others])
+
+    def _rays(self, row: NDArray[np.intp], beam: NDArray[np.intp]) -> Rays:
+        beam = beam[:, None]
+        return Rays(
+            row,
+            self.headings_rad[beam],
+            self.directions[beam, 0],
+            self.directions[beam, 1],
+            self.abreast_m[beam],
+            self.offset_m[beam],
+            self.ranges_m[beam],
         )
 
-    def in_base(self, local_xy: Array) -> Array:
-        """Points (C, 2) of the clusters' frames in the base frame."""
-        c, s = np.cos(self.bearings_rad), np.sin(self.bearings_rad)
+    def in_base(self, clusters: NDArray[np.intp], local_xy: Array) -> Array:
+        """Points (R, 2) of the frames of clusters (R,) in the base frame."""
+        bearings = self.bearings_rad[clusters]
+        c, s = np.cos(bearings), np.sin(bearings)
         x, y = local_xy[:, 0], local_xy[:, 1]
-        return self.anchors_xy + np.stack([c * x - s * y, s * x + c * y], axis=1)
+        return self.anchors_xy[clusters] + np.stack([c * x - s * y, s * x + c * y], axis=1)
 
 
 def windows(beams: Beams, clusters: Sequence[Cluster]) -> Windows:
-    """The windows of clusters that have at least one hit each."""
-    picked = [_beams_of(beams, cluster) for cluster in clusters]
-    width = max((len(index) for index, _, _ in picked), default=0)
-    index = np.zeros((len(clusters), width), dtype=np.int64)
-    is_hit, exists = np.zeros(index.shape, dtype=np.bool_), np.zeros(index.shape, dtype=np.bool_)
-    beside = np.zeros(index.shape, dtype=np.float32)
-    for row, (which, hit, away) in enumerate(picked):
-        index[row, : len(which)], is_hit[row, : len(which)], exists[row, : len(which)] = which, hit, True
-        beside[row, : len(which)] = away
-    points = np.where(is_hit[..., None], beams.points_xy[index], 0.0)
-    count = np.maximum(is_hit.sum(axis=1), 1)
-    anchors = points.sum(axis=1) / count[:, None]
+    """The windows of one or more clusters that have at least one hit each."""
+    picked = [_beams_of(beams, one) for one in clusters]
+    index, is_hit, beside = (np.concatenate(parts) for parts in zip(*picked, strict=True))
+    cluster = np.repeat(np.arange(len(clusters)), [len(one) for one, _, _ in picked])
+    points, of = beams.points_xy[index[is_hit]], cluster[is_hit]
+    first = np.searchsorted(of, np.arange(len(clusters)))
+    anchors = np.add.reduceat(points, first) / np.bincount(of)[:, None]
     # Of two LiDARs on either side the one that has the first hit gives the direction of view.
-    origins = beams.origins_xy[index[np.arange(len(index)), np.argmax(is_hit, axis=1)]]
+    origins = beams.origins_xy[index[is_hit][first]]
     bearings = np.arctan2(*(anchors - origins).T[::-1])
-    c, s = np.cos(bearings)[:, None], np.sin(bearings)[:, None]
-    dx, dy = beams.directions_xy[index, 0], beams.directions_xy[index, 1]
-    ahead, left = c * dx + s * dy, c * dy - s * dx
-    away_xy = anchors[:, None] - beams.origins_xy[index]
-    lateral = c * (points[..., 1] - anchors[:, None, 1]) - s * (points[..., 0] - anchors[:, None, 0])
+    c, s = np.cos(bearings), np.sin(bearings)
+    lateral = c[of] * (points[:, 1] - anchors[of, 1]) - s[of] * (points[:, 0] - anchors[of, 0])
+    dx, dy = beams.directions_xy[index].T
+    ahead, left = c[cluster] * dx + s[cluster] * dy, c[cluster] * dy - s[cluster] * dx
+    away_x, away_y = (anchors[cluster] - beams.origins_xy[index]).T
     spacing = np.array([min(beams.spacing_rad[one.sweep] for one in cluster) for cluster in clusters])
     return Windows(
         anchors,
         bearings,
+        np.stack([np.minimum.reduceat(lateral, first), np.maximum.reduceat(lateral, first)], axis=1),
+        spacing * np.hypot(*(anchors - origins).T),
+        cluster,
         np.arctan2(left, ahead).astype(np.float32),
         np.stack([ahead, left], axis=-1).astype(np.float32),
-        (dx * away_xy[..., 0] + dy * away_xy[..., 1]).astype(np.float32),
-        (dx * away_xy[..., 1] - dy * away_xy[..., 0]).astype(np.float32),
-        np.where(exists, np.minimum(beams.ranges_m[index], _FAR_M), 0.0).astype(np.float32),
+        (dx * away_x + dy * away_y).astype(np.float32),
+        (dx * away_y - dy * away_x).astype(np.float32),
+        np.minimum(beams.ranges_m[index], _FAR_M).astype(np.float32),
         is_hit,
-        beside,
-        np.stack(
-            [np.where(is_hit, lateral, np.inf).min(axis=1), np.where(is_hit, lateral, -np.inf).max(axis=1)], axis=1
-        ),
-        spacing * np.hypot(*(anchors - origins).T),
+        beside.astype(np.float32),
     )
 
 
