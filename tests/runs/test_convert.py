@@ -1,23 +1,16 @@
 """Conversion: every message arrives, in time order, once; what cannot is told, and nothing is half written."""
 
 import json
-import resource
-import subprocess
-import sys
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
 from mcap.records import Attachment
 from mcap.writer import Writer as McapWriter
-from pymcap_cli.doctor import Severity, examine_mcap
 from rosbags.highlevel import AnyReader
-from rosbags.rosbag1 import Reader as Reader1
-from rosbags.rosbag2 import Reader as Reader2
 
+from tests.runs.conversion import doctor, one, run, stored
 from tests.sources.bags import (
     HUMBLE,
     ROS1,
@@ -31,8 +24,7 @@ from tests.sources.bags import (
 )
 from toolkit.errors import RecordingError, UsageError
 from toolkit.recording.reader import open_recording
-from toolkit.runs.convert import Conversion, Converted, Selection, convert
-from toolkit.sources import Progress
+from toolkit.runs.convert import Selection
 
 BAGS = (
     "legtracker_demo.bag",
@@ -46,34 +38,6 @@ BAGS = (
     "rosbag2_split_mcap",
     "topics_and_services.mcap",
 )
-
-
-@contextmanager
-def quiet(_label: str, _total: int | None) -> Iterator[Progress]:
-    yield lambda _advance: None
-
-
-def run(paths: Path | list[Path], output: Path, selection: Selection | None = None) -> Conversion:
-    several = paths if isinstance(paths, list) else [paths]
-    return convert(several, output, selection or Selection(), {"rosbag2": {"distro": "humble"}}, quiet)
-
-
-def one(paths: Path | list[Path], output: Path, selection: Selection | None = None) -> Converted:
-    (done,) = run(paths, output, selection).outputs
-    return done
-
-
-def doctor(path: Path) -> list[str]:
-    """Errors that pymcap-cli's doctor finds."""
-    with path.open("rb") as stream:
-        report = examine_mcap(stream, path.stat().st_size, str(path))
-    return [str(finding) for finding in report.findings if finding.severity is Severity.ERROR]
-
-
-def stored(path: Path) -> Counter[tuple[str, int, bytes]]:
-    """Topic, time and payload of every message of a ROS 2 bag, as rosbags reads them."""
-    with Reader2(path) as reader:
-        return Counter((connection.topic, time, bytes(data)) for connection, time, data in reader.messages())
 
 
 @pytest.mark.parametrize("name", [name for name in BAGS if not name.endswith(".bag")])
@@ -278,74 +242,3 @@ def test_equal_inputs_give_equal_bytes(tmp_path: Path) -> None:
     one(source, tmp_path / "a.mcap")
     one(tmp_path / "elsewhere" / "b.bag", tmp_path / "elsewhere" / "b.mcap")
     assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "elsewhere" / "b.mcap").read_bytes()
-
-
-def test_a_cut_bag_gives_an_output_and_its_losses(tmp_path: Path) -> None:
-    source = write_ros1(tmp_path / "a.bag")
-    source.write_bytes(source.read_bytes()[: source.stat().st_size * 3 // 4])
-    done = one(source, tmp_path / "out.mcap")
-    assert 0 < done.topics.total() < 80
-    assert done.losses
-    assert stored(tmp_path / "out.mcap").total() == done.topics.total()
-
-
-def test_a_damaged_chunk_is_counted(tmp_path: Path) -> None:
-    source = write_ros1(tmp_path / "a.bag", compression="bz2")
-    with Reader1(source) as reader:
-        chunk = reader.chunks[min(reader.chunks)]
-    data = bytearray(source.read_bytes())
-    data[chunk.datapos + 20] ^= 1
-    source.write_bytes(data)
-    done = one(source, tmp_path / "out.mcap")
-    assert done.declared == 80
-    assert done.lost == 80 - done.topics.total() > 0
-    assert done.losses[0].startswith("a.bag: the chunk at byte")
-
-
-def test_where_nothing_can_be_read_nothing_is_written(tmp_path: Path) -> None:
-    source = write_ros1(tmp_path / "a.bag")
-    source.write_bytes(source.read_bytes()[:4300])
-    with pytest.raises(RecordingError, match="no message can be read"):
-        run(source, tmp_path / "out.mcap")
-    empty = write_plain_db3(tmp_path / "empty.db3", count=0)
-    with pytest.raises(RecordingError, match="there are no messages in it"):
-        run(empty, tmp_path / "out.mcap")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.bag", "empty.db3"]
-
-
-def test_a_log_that_fails_among_several_does_not_stop_the_others(tmp_path: Path) -> None:
-    good, bad = write_ros1(tmp_path / "good.bag"), write_plain_db3(tmp_path / "bad.db3", message_type="my_msgs/msg/Own")
-    conversion = run([bad, good], tmp_path / "out")
-    assert [entry.path.name for entry in conversion.outputs] == ["good.mcap"]
-    assert "my_msgs/msg/Own" in str(conversion.failures[0])
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["good.mcap"]
-
-
-def test_the_input_is_never_the_output(tmp_path: Path) -> None:
-    source = tmp_path / "a.mcap"
-    one(write_ros1(tmp_path / "a.bag"), source)
-    before = source.read_bytes()
-    with pytest.raises(UsageError, match="is part of the input"):
-        run(source, source)
-    assert source.read_bytes() == before
-    folder = write_ros2(tmp_path / "bag", storage="mcap")
-    with pytest.raises(UsageError, match="is part of the input"):
-        run(folder, folder / "bag.mcap")
-    with pytest.raises(UsageError, match="is given 2 times"):
-        run([source, source], tmp_path / "out.mcap")
-
-
-def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
-    source = write_ros1(tmp_path / "a.bag", count=2000)
-    program = "from toolkit.cli.main import run; run()"
-    done = subprocess.run(
-        [sys.executable, "-c", program, "convert", source, "-o", tmp_path / "out.mcap"],
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
-    )
-    assert done.returncode == 1
-    assert done.stderr.count("\n") == 1
-    assert "free space" in done.stderr
-    assert [path.name for path in tmp_path.iterdir()] == ["a.bag"]

@@ -9,7 +9,7 @@ import pytest
 
 from tests.landmarks.maps import small_map
 from tests.runs.chain import STEP_NS, raw_messages, two_posts
-from tests.runs.test_convert import quiet
+from tests.runs.conversion import quiet
 from tests.sources.bags import times, write_ros1
 from toolkit.channels import CAMERA_INFO, MAP, TF, TF_STATIC, TRUTH_OBJECTS
 from toolkit.errors import RecordingError

@@ -1,0 +1,40 @@
+"""Conversions without a progress bar, and what others read in their outputs."""
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from pymcap_cli.doctor import Severity, examine_mcap
+from rosbags.rosbag2 import Reader as Reader2
+
+from toolkit.runs.convert import Conversion, Converted, Selection, convert
+from toolkit.sources import Progress
+
+
+@contextmanager
+def quiet(_label: str, _total: int | None) -> Iterator[Progress]:
+    yield lambda _advance: None
+
+
+def run(paths: Path | list[Path], output: Path, selection: Selection | None = None) -> Conversion:
+    several = paths if isinstance(paths, list) else [paths]
+    return convert(several, output, selection or Selection(), {"rosbag2": {"distro": "humble"}}, quiet)
+
+
+def one(paths: Path | list[Path], output: Path, selection: Selection | None = None) -> Converted:
+    (done,) = run(paths, output, selection).outputs
+    return done
+
+
+def doctor(path: Path) -> list[str]:
+    """Errors that pymcap-cli's doctor finds."""
+    with path.open("rb") as stream:
+        report = examine_mcap(stream, path.stat().st_size, str(path))
+    return [str(finding) for finding in report.findings if finding.severity is Severity.ERROR]
+
+
+def stored(path: Path) -> Counter[tuple[str, int, bytes]]:
+    """Topic, time and payload of every message of a ROS 2 bag, as rosbags reads them."""
+    with Reader2(path) as reader:
+        return Counter((connection.topic, time, bytes(data)) for connection, time, data in reader.messages())
