@@ -17,6 +17,9 @@ from toolkit.resources import resource
 
 APPLICATION_ID = 0x4D434C4D
 SCHEMA_VERSION = 1
+_NUMBERS = ("x_m", "y_m", "var_x_m2", "cov_xy_m2", "var_y_m2", "radius_m")
+_COLUMNS = [("number", "i8"), ("id", "O"), ("class", "O"), *((name, "f8") for name in _NUMBERS)]
+_COLUMNS += [("sightings", "i8"), ("tentative", "?")]
 _UPPER = np.triu_indices(3)
 # Arrays of landmarks that are kept to load the index of a map with so many landmarks in less time.
 _KEPT = {"triangles": 3, "pairs": 2}
@@ -117,20 +120,22 @@ def _map_of(database: sqlite3.Connection) -> LandmarkMap:
     frame = database.execute("SELECT frame FROM map").fetchone()
     if frame is None:
         raise ValueError("its table map is empty")
-    rows = database.execute(
+    found = database.execute(
         "SELECT number, id, class, x_m, y_m, var_x_m2, cov_xy_m2, var_y_m2, radius_m, sightings, tentative"
         " FROM landmark ORDER BY number"
-    ).fetchall()
-    numbers = np.array([row[3:9] for row in rows], dtype=np.float64).reshape(-1, 6)
+    )
+    rows = np.fromiter(found, dtype=_COLUMNS)
+    spread = [rows[name] for name in ("var_x_m2", "cov_xy_m2", "cov_xy_m2", "var_y_m2")]
+    ids = tuple(rows["id"].tolist())
     return LandmarkMap(
-        ids=tuple(row[1] for row in rows),
-        classes=tuple(row[2] for row in rows),
-        positions_xy=numbers[:, :2],
-        covariances=numbers[:, [2, 3, 3, 4]].reshape(-1, 2, 2),
-        radii_m=numbers[:, 5],
-        sightings=np.array([row[9] for row in rows], dtype=np.int64),
-        tentative=np.array([row[10] for row in rows], dtype=np.bool_),
-        groups=_read_groups(database, {row[0]: row[1] for row in rows}),
+        ids=ids,
+        classes=tuple(rows["class"].tolist()),
+        positions_xy=np.stack([rows["x_m"], rows["y_m"]], axis=-1),
+        covariances=np.stack(spread, axis=-1).reshape(-1, 2, 2),
+        radii_m=rows["radius_m"],
+        sightings=rows["sightings"],
+        tentative=rows["tentative"],
+        groups=_read_groups(database, dict(zip(rows["number"].tolist(), ids, strict=True))),
         sources=tuple(
             Source(*row)
             for row in database.execute("SELECT kind, fingerprint, bundles, used FROM source ORDER BY number")

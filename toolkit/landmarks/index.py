@@ -19,6 +19,7 @@ Ints = NDArray[np.int64]
 _APART = 1e3
 _WIDEST = 400.0
 _SMALL = 10**6
+_AT_ONCE = 20_000
 
 
 class _Triples(NamedTuple):
@@ -30,7 +31,8 @@ class _Triples(NamedTuple):
     @classmethod
     def of(cls, sides: Array, numbers: Ints) -> "_Triples":
         keys, place = _ranks(numbers)
-        points = np.column_stack([sides, place * _APART])
+        points = np.empty((len(sides), 4))
+        points[:, :3], points[:, 3] = sides, place * _APART
         return cls(cKDTree(points, 32, balanced_tree=False, compact_nodes=False), keys)
 
     def near(self, sides: Array, numbers: Ints, tolerance: Array) -> tuple[Ints, Ints]:
@@ -117,6 +119,7 @@ class MapIndex:
         positions = landmark_map.positions_xy[rows]
         places = cKDTree(positions, balanced_tree=False)
         near = neighbours or Neighbours.of(places, positions, class_of)
+        lengths = _lengths(positions, near.pairs)[:, 0]
         return cls(
             landmark_map,
             rows,
@@ -124,12 +127,12 @@ class MapIndex:
             class_of,
             positions,
             landmark_map.covariances[rows],
-            _extent(places, positions),
+            _extent(lengths, positions),
             places,
             near.triangles,
             near.pairs,
-            _Triples.of(side_lengths(positions[near.triangles]), _number(class_of[near.triangles], len(names))),
-            _Doubles.of(side_lengths(positions[near.pairs])[:, 0], _number(class_of[near.pairs], len(names))),
+            _Triples.of(_lengths(positions, near.triangles), _number(class_of[near.triangles], len(names))),
+            _Doubles.of(lengths, _number(class_of[near.pairs], len(names))),
         )
 
     def __len__(self) -> int:
@@ -192,7 +195,9 @@ def first_corner(classes: Ints, count: int) -> Ints:
 
 
 def _number(classes: Ints, count: int) -> Ints:
-    number: Ints = classes @ (count ** np.arange(classes.shape[1])[::-1])
+    number = classes[:, 0]
+    for column in classes.T[1:]:
+        number = number * count + column
     return number
 
 
@@ -207,7 +212,15 @@ def _ranks(numbers: Ints) -> tuple[Ints, Ints]:
     return keys, rank[numbers]
 
 
-def _extent(places: cKDTree, positions: Array) -> tuple[float, float]:
-    nearest = np.asarray(places.query(positions, k=[2])[0])
+def _lengths(positions: Array, corners: NDArray[np.int32]) -> Array:
+    """As `side_lengths` (T, S) of groups (T, S) of positions, of which there are many: some at once, for the cache."""
+    lengths = np.empty(corners.shape)
+    for first in range(0, len(corners), _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        lengths[part] = side_lengths(positions[corners[part]])
+    return lengths
+
+
+def _extent(lengths: Array, positions: Array) -> tuple[float, float]:
     widest = float(np.linalg.norm(np.ptp(positions, axis=0)))
-    return float(nearest.min(where=nearest > 0, initial=widest)), widest
+    return float(lengths.min(where=lengths > 0, initial=widest)), widest

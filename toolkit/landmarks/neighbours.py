@@ -45,8 +45,10 @@ class Neighbours:
 def confirmed(landmark_map: LandmarkMap) -> tuple[Ints, tuple[str, ...], Ints]:
     """Rows (N,) of the confirmed landmarks of a map, the names of their classes, and which (N,) of these each has."""
     rows = np.flatnonzero(~landmark_map.tentative)
-    names, class_of = np.unique([landmark_map.classes[i] for i in rows], return_inverse=True)
-    return rows, tuple(names.tolist()), class_of
+    classes = [landmark_map.classes[i] for i in rows.tolist()]
+    names = sorted(set(classes))
+    number = {name: i for i, name in enumerate(names)}
+    return rows, tuple(names), np.fromiter(map(number.__getitem__, classes), dtype=np.int64, count=len(classes))
 
 
 def _neighbours(places: cKDTree, positions: Array) -> Ints:
