@@ -21,7 +21,9 @@ def test_where_nothing_may_be_written(tmp_path: Path, monkeypatch: pytest.Monkey
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "mkdir", forbidden)
-    with pytest.raises(RecordingError, match=r"demo: cannot be made \(Permission denied\); choose another place with -o"):
+    with pytest.raises(
+        RecordingError, match=r"demo: cannot be made \(Permission denied\); choose another place with -o"
+    ):
         make_folder(tmp_path / "demo")
 
 
