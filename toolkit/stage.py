@@ -36,6 +36,10 @@ class ChannelSummary:
     count: int
 
 
+Progress = Callable[[int], None]
+"""Is told how much was done since the last time: bytes, where nothing else is said."""
+
+
 class RawMessage(NamedTuple):
     """One message as it lies in a recording; a tuple, since hot loops make millions."""
 

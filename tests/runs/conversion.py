@@ -1,25 +1,18 @@
-"""Conversions without a progress bar, and what others read in their outputs."""
+"""Conversions, and what others read in their outputs."""
 
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from pymcap_cli.doctor import Severity, examine_mcap
 from rosbags.rosbag2 import Reader as Reader2
 
+from toolkit.runs.bench import unwatched
 from toolkit.runs.convert import Conversion, Converted, Selection, convert
-from toolkit.sources import Progress
-
-
-@contextmanager
-def quiet(_label: str, _total: int | None) -> Iterator[Progress]:
-    yield lambda _advance: None
 
 
 def run(paths: Path | list[Path], output: Path, selection: Selection | None = None) -> Conversion:
     several = paths if isinstance(paths, list) else [paths]
-    return convert(several, output, selection or Selection(), {"rosbag2": {"distro": "humble"}}, quiet)
+    return convert(several, output, selection or Selection(), {"rosbag2": {"distro": "humble"}}, unwatched)
 
 
 def one(paths: Path | list[Path], output: Path, selection: Selection | None = None) -> Converted:

@@ -9,7 +9,6 @@ import pytest
 
 from tests.landmarks.maps import small_map
 from tests.runs.chain import STEP_NS, raw_messages, two_posts
-from tests.runs.conversion import quiet
 from tests.sources.bags import times, write_ros1
 from toolkit.channels import CAMERA_INFO, MAP, TF, TF_STATIC, TRUTH_OBJECTS
 from toolkit.errors import RecordingError
@@ -21,6 +20,7 @@ from toolkit.messages.scene import SceneObjects
 from toolkit.messages.transforms import TFMessage, Transform
 from toolkit.recording.reader import open_recording
 from toolkit.recording.writer import create_recording
+from toolkit.runs.bench import unwatched
 from toolkit.runs.bundles import Span
 from toolkit.runs.convert import Selection, convert
 from toolkit.runs.pipeline import LogRun, run_stages
@@ -149,7 +149,7 @@ def test_whole_logs_and_results_alone_carry_nothing(here: Path) -> None:
 
 
 def test_conversion_cuts_the_same_way(here: Path) -> None:
-    conversion = convert([here / "log.mcap"], here / "out.mcap", Selection((), START_NS), {}, quiet)
+    conversion = convert([here / "log.mcap"], here / "out.mcap", Selection((), START_NS), {}, unwatched)
     (done,) = conversion.outputs
     cut(here, "log.mcap", "cut.mcap")
     for topic in (TF_STATIC.topic, CAMERA_INFO.topic, TRUTH_OBJECTS.topic):
@@ -157,17 +157,17 @@ def test_conversion_cuts_the_same_way(here: Path) -> None:
         assert found == [raw[1:] for raw in of_topic(here / "cut.mcap", topic)]
     assert done.notes == [cut(here, "log.mcap", "cut.mcap").notes[0]]
     assert done.declared == done.topics.total()
-    only = convert([here / "log.mcap"], here / "scans.mcap", Selection(("/scan",), START_NS), {}, quiet)
+    only = convert([here / "log.mcap"], here / "scans.mcap", Selection(("/scan",), START_NS), {}, unwatched)
     assert only.outputs[0].notes == []
 
 
 def test_what_a_ros_1_bag_latched_comes_along_unless_nothing_follows(tmp_path: Path) -> None:
     source, at_ns = write_ros1(tmp_path / "a.bag"), times(40)
-    (done,) = convert([source], tmp_path / "out.mcap", Selection((), at_ns[30], at_ns[33]), {}, quiet).outputs
+    (done,) = convert([source], tmp_path / "out.mcap", Selection((), at_ns[30], at_ns[33]), {}, unwatched).outputs
     assert done.topics == {"/scan": 3, "/talk": 4}
     assert [raw.log_time_ns for raw in of_topic(tmp_path / "out.mcap", "/talk")][:2] == [at_ns[30], at_ns[30] + 1]
     assert of_topic(tmp_path / "out.mcap", "/talk")[0].publish_time_ns == at_ns[29] + 1
     assert done.notes == ["the latest from before --start is carried over and logged at it: /talk"]
     assert done.dropped == {"messages outside the time range": 73}
     with pytest.raises(RecordingError, match="no message lies in the time range"):
-        convert([source], tmp_path / "none.mcap", Selection((), at_ns[39] + 2), {}, quiet)
+        convert([source], tmp_path / "none.mcap", Selection((), at_ns[39] + 2), {}, unwatched)

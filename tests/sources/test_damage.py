@@ -9,16 +9,12 @@ from hypothesis import strategies as st
 
 from tests.sources.bags import write_plain_db3, write_ros1
 from toolkit.errors import RecordingError
+from toolkit.runs.bench import unwatched
 from toolkit.runs.convert import Selection, convert
-from toolkit.sources import Progress
 
 Edit = tuple[float, int]
 WHOLE = {"none.bag": 20, "bz2.bag": 20, "lz4.bag": 20, "a.db3": 60}
 EDITS = st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4)
-
-
-def quiet(_label: str, _total: int | None) -> contextlib.AbstractContextManager[Progress]:
-    return contextlib.nullcontext(lambda _advance: None)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +39,9 @@ def test_broken_bytes(name: str, edits: list[Edit], kept: float, bags: Path, tmp
     path = tmp_path / name
     path.write_bytes(data[: int(len(data) * kept)])
     with contextlib.suppress(RecordingError):
-        (done,) = convert([path], tmp_path / "o.mcap", Selection(), {"rosbag2": {"distro": "humble"}}, quiet).outputs
+        (done,) = convert(
+            [path], tmp_path / "o.mcap", Selection(), {"rosbag2": {"distro": "humble"}}, unwatched
+        ).outputs
         assert done.lost or done.losses or done.topics.total() >= WHOLE[name]
 
 
@@ -51,5 +49,5 @@ def test_a_bag_that_is_all_damage_leaves_no_output(bags: Path, tmp_path: Path) -
     path = tmp_path / "a.bag"
     path.write_bytes((bags / "bz2.bag").read_bytes()[:4117] + b"\xff" * 3000)
     with pytest.raises(RecordingError, match=r"a\.bag"):
-        convert([path], tmp_path / "o.mcap", Selection(), {}, quiet)
+        convert([path], tmp_path / "o.mcap", Selection(), {}, unwatched)
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.bag"]

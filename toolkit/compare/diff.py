@@ -20,9 +20,8 @@ from toolkit.errors import UsageError
 from toolkit.landmarks.database import read_manifest, read_map
 from toolkit.manifest import RUN
 from toolkit.messages.annotations import ImageAnnotations
-from toolkit.recording.blocks import Progress
 from toolkit.recording.reader import Recording, open_recording
-from toolkit.stage import Tolerance
+from toolkit.stage import Progress, Tolerance
 
 
 @dataclass(frozen=True, slots=True)

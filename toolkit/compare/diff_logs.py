@@ -17,9 +17,8 @@ from toolkit.errors import MessageError
 from toolkit.messages.columns import Column, Kind
 from toolkit.messages.layout import Layout, layout_of
 from toolkit.messages.typestore import definition, typestore
-from toolkit.recording.blocks import Progress
 from toolkit.recording.reader import Recording
-from toolkit.stage import Connection, RawMessage, Tolerance
+from toolkit.stage import Connection, Progress, RawMessage, Tolerance
 
 HELD_BYTES = 1 << 23
 """So much of both recordings is held before it is compared."""

@@ -1,6 +1,5 @@
 """What is evaluated, from files: recordings with results, landmark databases, Appendix D's text, TUM trajectories."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +27,8 @@ from toolkit.landmarks.exchange_thesis import parse_results
 from toolkit.landmarks.scene import scene_from_map
 from toolkit.messages.scene import SceneObjects
 from toolkit.recording.reader import Recording, open_recording
-from toolkit.stage import Channel, Connection
+from toolkit.stage import Channel, Connection, Progress
 
-Progress = Callable[[int], None]
 _RESULTS = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, MAP, MAP_POSE)
 _TRUTH = (TRUTH_POSE, TRUTH_OBJECTS)
 _AT_ONCE = 2000

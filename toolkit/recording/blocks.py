@@ -1,7 +1,7 @@
 """Blocks of a recording to messages: decompress, check, parse."""
 
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from struct import error as struct_error
 from typing import BinaryIO
 
@@ -147,6 +147,3 @@ def block_messages(
 
 def _log_time(message: RawMessage) -> int:
     return message.log_time_ns
-
-
-Progress = Callable[[int], None]

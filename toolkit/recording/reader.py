@@ -14,11 +14,11 @@ from mcap.exceptions import McapError
 
 from toolkit.errors import RecordingError
 from toolkit.manifest import RUN, carried_fingerprint
-from toolkit.recording.blocks import DamagedBlockError, Progress, block_messages
+from toolkit.recording.blocks import DamagedBlockError, block_messages
 from toolkit.recording.container import CHUNK, MAGIC, RECORD, Opcode, parse
 from toolkit.recording.index import Block, Index, index_from_summary, read_record
 from toolkit.recording.scan import index_by_scanning
-from toolkit.stage import ChannelSummary, Connection, RawMessage
+from toolkit.stage import ChannelSummary, Connection, Progress, RawMessage
 
 
 @contextlib.contextmanager

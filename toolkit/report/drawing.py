@@ -11,13 +11,14 @@ from toolkit.compare.alignment import fit
 from toolkit.compare.landmark_metrics import associate
 from toolkit.compare.metrics import Outcome, Reference, ScoredPoses, score
 from toolkit.compare.pose_metrics import align
-from toolkit.compare.read import Progress, read_run
+from toolkit.compare.read import read_run
 from toolkit.compare.trajectory import Trajectory, interpolated
 from toolkit.errors import RecordingError
 from toolkit.geometry.se2 import Array, compose, rotation, transform_points
 from toolkit.landmarks.database import read_map
 from toolkit.landmarks.model import Group
 from toolkit.messages.scene import SceneObjects
+from toolkit.stage import Progress
 
 _MAX_GAP_NS = 5 * 10**8
 

@@ -11,11 +11,11 @@ from typing import Protocol
 from toolkit.channels import TF
 from toolkit.errors import RecordingError
 from toolkit.manifest import Outcome, StageRecord
-from toolkit.recording.blocks import Progress
 from toolkit.recording.reader import Recording, open_recording
 from toolkit.runs.plan import Log, Request, Step
 from toolkit.runs.step import bundle_count, run_step
 from toolkit.runs.view import Layer, View, result_layers
+from toolkit.stage import Progress
 
 
 class Watch(Protocol):

@@ -4,8 +4,7 @@ import contextlib
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
@@ -16,13 +15,13 @@ from toolkit.manifest import CARRIED, RUN, Manifest, entry_text, file_hash
 from toolkit.messages.qos import KEY
 from toolkit.recording.lasting import carried_note, lasting, latest
 from toolkit.recording.writer import create_recording
+from toolkit.runs.bench import Watch
 from toolkit.runs.config import Settings, effective
 from toolkit.runs.logs import McapLog, OpenLog, open_logs
 from toolkit.runs.outputs import make_folder, output_files
-from toolkit.sources import Piece, Progress, merge
-from toolkit.stage import Connection, RawMessage
+from toolkit.sources import Piece, merge
+from toolkit.stage import Connection, Progress, RawMessage
 
-Watch = Callable[[str, int | None], AbstractContextManager[Progress]]
 _LOST_WITH = frozenset({RUN, "rosbag2"})  # metadata records that would no longer be true
 _COMMENT = re.compile(rb"#[^\n]*")
 

@@ -10,8 +10,8 @@ from toolkit.errors import MessageError
 from toolkit.recording.reader import open_recording
 from toolkit.recording.writer import RecordingWriter
 from toolkit.runs.config import Settings, stage_config
-from toolkit.sources import Carried, Log, McapFile, Progress, source_of
-from toolkit.stage import ChannelSummary, Connection, RawMessage
+from toolkit.sources import Carried, Log, McapFile, source_of
+from toolkit.stage import ChannelSummary, Connection, Progress, RawMessage
 
 
 @dataclass(frozen=True, slots=True)

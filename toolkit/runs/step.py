@@ -10,7 +10,6 @@ from toolkit.channels import ANNOTATIONS, CAMERA_IMAGE, ODOM_FRAME, ODOMETRY, TF
 from toolkit.errors import RecordingError, UsageError
 from toolkit.manifest import RUN, Manifest, Outcome, StageRecord
 from toolkit.messages.codec import decode
-from toolkit.recording.blocks import Progress
 from toolkit.recording.writer import create_recording
 from toolkit.runs.bundles import Reading, Span, held_before, inputs_of, read_bundles
 from toolkit.runs.inputs import beside_camera_info, choose
@@ -18,7 +17,7 @@ from toolkit.runs.plan import Step
 from toolkit.runs.tallies import tally
 from toolkit.runs.thinning import Thinning, thin
 from toolkit.runs.view import Readable, View
-from toolkit.stage import Channel, Connection, Omission, RawMessage, Reduction, Stage, Stamped
+from toolkit.stage import Channel, Connection, Omission, Progress, RawMessage, Reduction, Stage, Stamped
 
 
 def run_step(step: Step, view: View, span: Span, thinning: Thinning, target: Path, progress: Progress) -> StageRecord:

@@ -17,10 +17,9 @@ from toolkit.messages.images import CameraInfo
 from toolkit.messages.poses import Odometry
 from toolkit.messages.scan import LaserScan
 from toolkit.messages.transforms import TFMessage
-from toolkit.recording.blocks import Progress
 from toolkit.runs.logs import OpenLog
 from toolkit.sources import merge
-from toolkit.stage import Connection, RawMessage
+from toolkit.stage import Connection, Progress, RawMessage
 
 SENSORS = ("image", "camera_info", "scan", "odometry", "scene_objects")
 """The roles that are looked at."""

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Protocol
 
 from toolkit.manifest import STAGE, StageRecord, stage_records
-from toolkit.recording.blocks import Progress
 from toolkit.recording.reader import Recording
-from toolkit.stage import ChannelSummary, Connection, RawMessage
+from toolkit.stage import ChannelSummary, Connection, Progress, RawMessage
 
 
 class Readable(Protocol):

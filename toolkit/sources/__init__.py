@@ -6,7 +6,7 @@ from pathlib import Path
 
 from toolkit.errors import RecordingError
 from toolkit.sources._merge import Piece, merge
-from toolkit.sources._shape import Carried, Log, McapFile, NoConfig, Progress, Source, SourceLog
+from toolkit.sources._shape import Carried, Log, McapFile, NoConfig, Source, SourceLog
 
 
 def source_names() -> tuple[str, ...]:
@@ -46,7 +46,6 @@ __all__ = [
     "McapFile",
     "NoConfig",
     "Piece",
-    "Progress",
     "Source",
     "SourceLog",
     "find_source",

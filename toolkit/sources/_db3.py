@@ -14,8 +14,7 @@ import zstandard
 from toolkit.errors import MessageError, RecordingError
 from toolkit.messages.qos import KEY
 from toolkit.sources._ros2_types import check_fits, definition_in, known_distribution
-from toolkit.sources._shape import Progress
-from toolkit.stage import ChannelSummary, Connection, RawMessage
+from toolkit.stage import ChannelSummary, Connection, Progress, RawMessage
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _REPORT_BYTES = 1 << 20

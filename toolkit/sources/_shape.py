@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from toolkit.stage import ChannelSummary, Connection, RawMessage
+from toolkit.stage import ChannelSummary, Connection, Progress, RawMessage
 
-Progress = Callable[[int], None]
 Payload = bytes | memoryview
 
 

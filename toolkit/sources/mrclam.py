@@ -28,8 +28,8 @@ from toolkit.sources._mrclam_robot import (
     odometry_covariance,
     scans,
 )
-from toolkit.sources._shape import Progress, Source, SourceLog
-from toolkit.stage import Channel, ChannelSummary, Connection, RawMessage
+from toolkit.sources._shape import Source, SourceLog
+from toolkit.stage import Channel, ChannelSummary, Connection, Progress, RawMessage
 
 _BARCODES, _LANDMARKS = "Barcodes.dat", "Landmark_Groundtruth.dat"
 

@@ -12,8 +12,8 @@ from toolkit.sources._bag_container import MAGIC, BagConnection, BagMessage, Chu
 from toolkit.sources._bag_index import BagIndex, read_chunk, read_index
 from toolkit.sources._merge import merge
 from toolkit.sources._ros1_types import Convert, converted
-from toolkit.sources._shape import NoConfig, Progress, Source, SourceLog
-from toolkit.stage import ChannelSummary, Connection, RawMessage
+from toolkit.sources._shape import NoConfig, Source, SourceLog
+from toolkit.stage import ChannelSummary, Connection, Progress, RawMessage
 
 
 def recognises(path: Path) -> bool:
