@@ -8,7 +8,6 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import say, say_json, table
-from toolkit.errors import UsageError
 
 if TYPE_CHECKING:
     from toolkit.compare.explain import Condition, Place, Situation
@@ -27,13 +26,9 @@ def command(
     """
     from toolkit.compare.explain import conditions_of, places_of
     from toolkit.report.explain_reading import read_situation
-    from toolkit.report.plots import FORMATS
+    from toolkit.report.plots import form_of
 
-    form = output.suffix.lower().removeprefix(".") if output else "png"
-    if form not in FORMATS:
-        raise UsageError(
-            f"{output}: the name does not tell the format; use {', '.join(f'.{name}' for name in FORMATS)}"
-        )
+    form = form_of(output) if output else ""
     situation, view = read_situation(result, options.time_ns(at, "--at") or 0)
     places = places_of(situation)
     conditions = conditions_of(situation, places)

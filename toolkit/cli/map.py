@@ -75,7 +75,7 @@ def _from_reference(logs: list[Path], map_file: Path, json: bool) -> None:
     from toolkit.runs.reference_map import map_from_reference
 
     if len(logs) != 1:
-        raise UsageError("--from-reference takes one log")
+        raise UsageError("--from-reference takes one log; name just that one")
     landmark_map = map_from_reference(logs[0], map_file)
     if json:
         say_json(

@@ -35,16 +35,11 @@ def command(
 ) -> None:
     """Plot INPUT... into one picture (.png, .svg, .pdf): landmarks by class, paths, positions and their errors."""
     from toolkit.atomic import atomic_file
-    from toolkit.errors import UsageError
     from toolkit.report.comparison import errors_figure, positions_figure
     from toolkit.report.drawing import gather
-    from toolkit.report.plots import FORMATS, figure, save
+    from toolkit.report.plots import figure, form_of, save
 
-    form = output.suffix.lower().removeprefix(".")
-    if form not in FORMATS:
-        raise UsageError(
-            f"{output}: the name does not tell the format; use {', '.join(f'.{name}' for name in FORMATS)}"
-        )
+    form = form_of(output)
     with progress("read", sum(path.stat().st_size for path in inputs if path.is_file())) as advance:
         drawing, losses = gather(inputs, aligned=align, progress=advance)
     draw = {Show.MAP: figure, Show.POSITIONS: positions_figure, Show.ERRORS: errors_figure}[show]

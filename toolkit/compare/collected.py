@@ -27,6 +27,7 @@ from toolkit.stage import Channel
 
 Flags = NDArray[np.bool_]
 _APART_M = 0.5
+"""Objects farther apart than this are two, whatever their ids and classes; nearer ones need a closer look."""
 ONCE = (MAP, TRUTH_OBJECTS)
 """Channels of which the first message counts."""
 

@@ -12,7 +12,7 @@ from toolkit.recording.reader import Recording
 from toolkit.stage import Connection
 
 Row = dict[str, Any]
-_FOLLOWS = re.compile(r"content|options\.logs|stages\.[^.]*\.(key|outcome|inputs|resources|code)(\..*)?")
+_FOLLOWS = re.compile(r"content|carried(\..*)?|options\.logs|stages\.[^.]*\.(key|outcome|inputs|resources|code)(\..*)?")
 
 
 def manifest_rows(baseline: Mapping[str, str], candidate: Mapping[str, str]) -> list[Row]:

@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 _LONG = 8
+"""Of more numbers than these only the place and values that differ the most are shown."""
 _PLACES = ("position_m", "translation_m")
 _ANGLES = ("theta", "angle_min", "angle_max", "_rad")
 

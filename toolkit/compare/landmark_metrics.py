@@ -11,6 +11,7 @@ from toolkit.geometry.se2 import Array, transform_points
 from toolkit.messages.scene import SceneObjects
 
 GATE_M = 3.0
+"""A landmark that is farther off than this is missing, and another one spurious."""
 _ROUNDS = 20
 
 

@@ -32,6 +32,7 @@ from toolkit.stage import Channel, Connection, Progress
 _RESULTS = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, MAP, MAP_POSE)
 _TRUTH = (TRUTH_POSE, TRUTH_OBJECTS)
 _AT_ONCE = 2000
+"""So many messages become columns together; memory stays small."""
 
 
 def read_run(path: Path, progress: Progress | None = None) -> tuple[Outcome, Reference, list[str]]:

@@ -36,7 +36,7 @@ def _open(path: Path) -> BinaryIO:
     try:
         return path.open("rb")
     except FileNotFoundError as error:
-        raise RecordingError(f"{path}: there is no such file") from error
+        raise RecordingError(f"{path}: there is no such file; check the path") from error
     except IsADirectoryError as error:
         raise RecordingError(
             f"{path} is a folder; convert it first: mcap-landmarks convert {path} -o LOG.mcap"

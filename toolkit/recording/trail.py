@@ -18,6 +18,7 @@ WIDEST_GAP_NS = 2 * 10**9
 
 _KEPT_NS = 3 * WIDEST_GAP_NS
 _AROUND_NS = 300_000_000
+"""Steps span so much more than the sweep, for a scan of a second LiDAR beside it or a cloud stamped at its end."""
 _BASES = ("base_footprint", "base_link")
 
 

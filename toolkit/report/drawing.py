@@ -21,6 +21,7 @@ from toolkit.messages.scene import SceneObjects
 from toolkit.stage import Progress
 
 _MAX_GAP_NS = 5 * 10**8
+"""The truth is interpolated over gaps up to this, as `evaluate` does by default."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

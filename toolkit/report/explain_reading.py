@@ -36,6 +36,7 @@ from toolkit.vision.pixels import rgb_from_message
 
 _AROUND_NS = 3 * 10**9
 _BESIDE_NS = 10**9
+"""How far from the asked time the bundle may be, and from the bundle what its sensors saw."""
 _OF_BUNDLE = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, SCAN_OBJECTS)
 _BESIDE = (DETECTIONS, CAMERA_IMAGE, SCAN)
 

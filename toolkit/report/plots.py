@@ -3,6 +3,7 @@
 import warnings
 from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import matplotlib as mpl
@@ -12,6 +13,7 @@ from matplotlib.collections import EllipseCollection, LineCollection, PolyCollec
 from matplotlib.figure import Figure
 
 from toolkit.compare.pose_metrics import FALSE_M
+from toolkit.errors import UsageError
 from toolkit.geometry.se2 import Array
 from toolkit.landmarks.model import Group
 from toolkit.report.drawing import Drawing, Run, breaks
@@ -24,6 +26,7 @@ _MARKERS = "osD^vPXp"
 _TRUTH, _GROUP, _ERROR = "#8A8F98", "#6B7280", "#DC2626"
 _RUNS = ("#111827", "#1D4ED8", "#B45309", "#047857", "#7E22CE")
 _RADII_95 = 2.4477
+"""An ellipse of so many sigmas holds 95 % of a normal distribution of the plane."""
 _MOST_LABELS = 60
 _STYLE: dict[Any, Any] = {  # matplotlib's own type is a list of several hundred literals
     "font.size": 9,
@@ -35,6 +38,19 @@ _STYLE: dict[Any, Any] = {  # matplotlib's own type is a list of several hundred
     "svg.hashsalt": "mcap-landmarks",
     "savefig.dpi": 200,
 }
+
+
+def form_of(path: Path) -> str:
+    """The format that a file's name asks for.
+
+    Raises:
+        UsageError: it asks for none of them.
+    """
+    form = path.suffix.lower().removeprefix(".")
+    if form not in FORMATS:
+        known = ", ".join(f".{name}" for name in FORMATS)
+        raise UsageError(f"{path}: the name does not tell the format; use {known}")
+    return form
 
 
 def save(draw: Callable[[], Figure], stream: BinaryIO, form: str) -> None:

@@ -15,11 +15,17 @@ LEAST_HZ = {"image": 1.0, "scan": 2.0, "odometry": 5.0}
 
 _LONG_GAP_NS = 10**9
 _GAP_PERIODS = 10
+"""A gap is told where it is longer than both a second and so many usual periods."""
 _CLOCKS_APART_NS = 100_000_000
+"""Drivers and networks delay messages by less; turning at 1 rad/s, it is 6 degrees already."""
 _OTHER_EPOCH_NS = 5 * 10**9
+"""Stamps that are so far from log times are of another clock, or of a log that was recorded from a played one."""
 _MANY = 0.9
+"""Where fewer of a sensor's messages have a partner, something is wrong with clocks or rates."""
 _LEAST_SCANS = 10
+"""Fewer scans say nothing about which beams never return."""
 _LEAST_BEAMS = 3
+"""Fewer dark beams side by side are dirt or chance, not something in the way."""
 _MOST_SECTORS = 3
 _BASES = ("base_footprint", "base_link")
 

@@ -63,7 +63,7 @@ def _from_file(path: Path) -> Settings:
     try:
         tables = tomllib.loads(path.read_text())
     except FileNotFoundError as error:
-        raise UsageError(f"{path}: there is no such configuration file") from error
+        raise UsageError(f"{path}: there is no such configuration file; check the path") from error
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise UsageError(f"{path}: not a TOML file: {error}") from error
     for name, table in tables.items():

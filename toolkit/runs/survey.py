@@ -26,6 +26,7 @@ SENSORS = ("image", "camera_info", "scan", "odometry", "scene_objects")
 
 _MOST_SCANS = 400
 _MOST_TRANSFORMS = 300
+"""So many of a topic are decoded, spread over the log or its first: which beams and frames there are shows soon."""
 _BIG, _LITTLE = struct.Struct(">iI"), struct.Struct("<iI")
 
 
