@@ -103,6 +103,7 @@ PLANTED: dict[str, tuple[Change, set[tuple[str, str, str]]]] = {
     ),
     "no odometry": (of(ODOMETRY, lambda _: None), {("frames", "", "there is no odometry")}),
     "no camera_info": (of(CAMERA_INFO, lambda _: None), {("camera", "/camera/image_raw/compressed", "no camera_info")}),
+    "camera_info from before a cut": (of(CAMERA_INFO, lambda s: late(s, 7 * SECOND)), set()),
     "no calibration": (of(CAMERA_INFO, uncalibrated), {("camera", "/camera/camera_info", "not calibrated")}),
     "blind beams": (
         of(SCAN, lambda s: blind(s, slice(45, 60))),

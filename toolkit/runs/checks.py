@@ -135,13 +135,14 @@ def _clocks(found: Survey) -> Iterator[Finding]:
 
 
 def _delay_ns(sensor: Sensor) -> float | None:
-    """How much later than they were whole messages are logged, most often; None without stamps.
+    """How much later than they were whole messages are logged, most often; None where that says nothing of clocks.
 
-    Whether a scan's stamp is that of its first or of its last beam is not told; what explains more counts.
+    Whether a scan's stamp is that of its first or of its last beam is not told; what explains more counts. Camera
+    information holds until the next comes: it is often latched, or carried over from before a cut.
     """
     log_ns, stamp_ns = sensor.times
     known = stamp_ns != 0
-    if not known.any():
+    if sensor.role == "camera_info" or not known.any():
         return None
     delay_ns = float(np.median(log_ns[known] - stamp_ns[known]))
     return min(delay_ns, delay_ns - sensor.sweep_ns, key=abs)
