@@ -2,6 +2,11 @@
 
 An EKF over the robot's pose and every landmark (Dissanayake et al. 2001) keeps the covariances that gates need: small
 towards what was just seen, wide towards what was left long ago. Only labels are taken from it; the graph does the rest.
+
+Its errors are right-invariant (Barrau and Bonnabel 2015; for SLAM Zhang et al. 2017): those of a rotation of everything
+about the origin, then of shifts of robot and landmarks. Jacobians of what is seen then hold no estimate, so the filter
+cannot take its own changes of mind for knowledge of the heading, which makes the common EKF far too sure (Huang et al.
+2010): at a place seen again after a long loop it would not recognise anything.
 """
 
 import math
@@ -12,6 +17,8 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.stats import chi2
 
+from toolkit.geometry import se2
+from toolkit.geometry.angles import wrap
 from toolkit.geometry.se2 import Array, between, compose, rotation, transform_points
 
 _FAR = 1e9
@@ -32,7 +39,11 @@ class Gates:
 
 
 class LandmarkFilter:
-    """EKF of one robot: state pose and landmarks, in the frame of its odometry."""
+    """EKF of one robot: state pose and landmarks, in the frame of its odometry.
+
+    `mean` (3 + 2 L,) holds x, y, heading and the landmarks. `covariance` is that of the right-invariant errors in the
+    same order: a heading error turns all of them about the origin, the others are shifts.
+    """
 
     def __init__(self, start: Array, gates: Gates) -> None:
         self.mean: Array = np.array(start, dtype=np.float64)
@@ -43,16 +54,19 @@ class LandmarkFilter:
 
     def move(self, step: Array, step_covariance: Array) -> None:
         """Follow the odometry's step (3,) in the base frame, with covariance (3, 3)."""
-        pose = self.mean[:3]
-        turn = rotation(pose[2])
-        jacobian = np.eye(3)
-        jacobian[:2, 2] = turn @ np.array([-step[1], step[0]])
-        noise = np.eye(3)
-        noise[:2, :2] = turn
-        self.mean[:3] = compose(pose, step)
-        cross = jacobian @ self.covariance[:3]
-        self.covariance[:3], self.covariance[:, :3] = cross, cross.T
-        self.covariance[:3, :3] = cross[:, :3] @ jacobian.T + noise @ step_covariance @ noise.T
+        turn = rotation(self.mean[2])
+        self.mean[:3] = compose(self.mean[:3], step)
+        noise = np.zeros((len(self.mean), 3))
+        noise[:, 2] = -self._turned_about_origin()
+        noise[:2, :2], noise[2, 2] = turn, 1.0
+        self.covariance += noise @ step_covariance @ noise.T
+
+    def _turned_about_origin(self) -> Array:
+        """How robot and landmarks move (3 + 2 L,) per radian by which all turn about the origin; 0 for the heading."""
+        moved = np.empty_like(self.mean)
+        moved[0], moved[1], moved[2] = -self.mean[1], self.mean[0], 0.0
+        moved[3::2], moved[4::2] = -self.mean[4::2], self.mean[3::2]
+        return moved
 
     def see(self, kinds: NDArray[np.int64], points_xy: Array, covariances: Array) -> NDArray[np.int64]:
         """Label (K,) each object of one bundle with a landmark's number, new ones included; learn from it.
@@ -76,26 +90,15 @@ class LandmarkFilter:
             labels[row] = self._insert(int(kinds[row]), points_xy[row], covariances[row])
         return labels
 
-    def _predict(self, landmark: int) -> tuple[Array, Array, NDArray[np.int64]]:
-        """Landmark (2,) in the base frame, its Jacobian (2, 5) by pose and landmark, and their places in the state."""
-        pose = self.mean[:3]
-        back = rotation(pose[2]).T
-        point = back @ (self.mean[3 + 2 * landmark : 5 + 2 * landmark] - pose[:2])
-        jacobian = np.column_stack([-back, np.array([point[1], -point[0]]), back])
-        return point, jacobian, np.array([0, 1, 2, 3 + 2 * landmark, 4 + 2 * landmark])
-
     def _distances(self, candidates: NDArray[np.int64], point: Array, covariance: Array) -> Array:
         """Squared Mahalanobis distance (C,) of one observation to each of C landmarks."""
-        pose, count = self.mean[:3], len(candidates)
-        columns = np.column_stack([np.tile([0, 1, 2], (count, 1)), 3 + 2 * candidates, 4 + 2 * candidates])
-        back = rotation(pose[2]).T
-        predicted = (self.mean[columns[:, 3:]] - pose[:2]) @ back.T
-        jacobian = np.zeros((count, 2, 5))
-        jacobian[:, :, :2], jacobian[:, :, 3:] = -back, back
-        jacobian[:, 0, 2], jacobian[:, 1, 2] = predicted[:, 1], -predicted[:, 0]
-        state = self.covariance[columns[:, :, None], columns[:, None, :]]
-        spread = jacobian @ state @ jacobian.swapaxes(1, 2) + covariance
-        miss = point - predicted
+        own = 3 + 2 * candidates[:, None] + np.arange(2)
+        cross, robot = self.covariance[:2][:, own], self.covariance[:2, :2]
+        state = robot + self.covariance[own[:, :, None], own[:, None, :]]
+        state = state - cross.transpose(1, 0, 2) - cross.transpose(1, 2, 0)
+        back = rotation(self.mean[2]).T
+        spread = back @ state @ back.T + covariance
+        miss = point - (self.mean[own] - self.mean[:2]) @ back.T
         squared: Array = np.einsum("ci,ci->c", miss, np.linalg.solve(spread, miss[..., None])[..., 0])
         return squared
 
@@ -123,14 +126,15 @@ class LandmarkFilter:
 
     def _stack(self, landmarks: NDArray[np.int64], points_xy: Array, covariances: Array) -> tuple[Array, Array, Array]:
         k = len(landmarks)
-        miss, jacobian, noise = np.empty(2 * k), np.zeros((2 * k, len(self.mean))), np.zeros((2 * k, 2 * k))
-        for i, landmark in enumerate(landmarks):
-            predicted, block, columns = self._predict(int(landmark))
+        back = rotation(self.mean[2]).T
+        jacobian, noise = np.zeros((2 * k, len(self.mean))), np.zeros((2 * k, 2 * k))
+        own = 3 + 2 * landmarks[:, None] + np.arange(2)
+        for i, columns in enumerate(own):
             part = slice(2 * i, 2 * i + 2)
-            miss[part] = points_xy[i] - predicted
-            jacobian[part, columns] = block
+            jacobian[part, :2], jacobian[part, columns] = -back, back
             noise[part, part] = covariances[i]
-        return miss, jacobian, noise
+        miss = points_xy - (self.mean[own] - self.mean[:2]) @ back.T
+        return miss.ravel(), jacobian, noise
 
     def _update(self, landmarks: NDArray[np.int64], points_xy: Array, covariances: Array) -> None:
         miss, jacobian, noise = self._stack(landmarks, points_xy, covariances)
@@ -139,20 +143,27 @@ class LandmarkFilter:
         squared = float(miss @ np.linalg.solve(spread, miss))
         self.log_evidence -= (squared + float(np.linalg.slogdet(spread)[1]) + len(miss) * math.log(2 * math.pi)) / 2
         gain = np.linalg.solve(spread, cross.T).T
-        self.mean = self.mean + gain @ miss
+        self._change(gain @ miss)
         self.covariance = self.covariance - gain @ cross.T
         self.covariance = (self.covariance + self.covariance.T) / 2
 
+    def _change(self, error: Array) -> None:
+        """Put right an error (3 + 2 L,): all turns by its heading's part, each shifts by its own."""
+        turned = rotation(error[2])
+        shift = se2.exp([1.0, 0.0, error[2]])[:2]
+        along = np.array([[shift[0], -shift[1]], [shift[1], shift[0]]])
+        self.mean[:2] = turned @ self.mean[:2] + along @ error[:2]
+        self.mean[2] = wrap(self.mean[2] + error[2])
+        landmarks = self.mean[3:].reshape(-1, 2) @ turned.T + error[3:].reshape(-1, 2) @ along.T
+        self.mean[3:] = landmarks.ravel()
+
     def _insert(self, kind: int, point: Array, covariance: Array) -> int:
-        pose, n = self.mean[:3], len(self.mean)
-        turn = rotation(pose[2])
-        by_pose = np.column_stack([np.eye(2), turn @ np.array([-point[1], point[0]])])
-        cross = by_pose @ self.covariance[:3]
+        n, turn = len(self.mean), rotation(self.mean[2])
         grown = np.zeros((n + 2, n + 2))
         grown[:n, :n] = self.covariance
-        grown[n:, :n], grown[:n, n:] = cross, cross.T
-        grown[n:, n:] = cross[:, :3] @ by_pose.T + turn @ covariance @ turn.T
-        self.mean = np.concatenate([self.mean, transform_points(pose, point)])
+        grown[n:, :n], grown[:n, n:] = self.covariance[:2], self.covariance[:, :2]
+        grown[n:, n:] = self.covariance[:2, :2] + turn @ covariance @ turn.T
+        self.mean = np.concatenate([self.mean, transform_points(self.mean[:3], point)])
         self.covariance = grown
         self.kinds = np.append(self.kinds, kind)
         return len(self.kinds) - 1
