@@ -16,8 +16,10 @@ from toolkit.landmarks.database import write_map
 from toolkit.manifest import RUN
 from toolkit.messages.codec import decode
 from toolkit.messages.images import CameraInfo
+from toolkit.messages.qos import KEY
 from toolkit.messages.scene import SceneObjects
 from toolkit.messages.transforms import TFMessage, Transform
+from toolkit.recording.lasting import lasting
 from toolkit.recording.reader import open_recording
 from toolkit.recording.writer import create_recording
 from toolkit.runs.bench import unwatched
@@ -25,7 +27,7 @@ from toolkit.runs.bundles import Span
 from toolkit.runs.convert import Selection, convert
 from toolkit.runs.pipeline import LogRun, run_stages
 from toolkit.runs.plan import Request
-from toolkit.stage import RawMessage, Stamped
+from toolkit.stage import Connection, RawMessage, Stamped
 
 ALL = ["detect", "cluster", "fuse", "localize"]
 START_NS = 3 * STEP_NS
@@ -137,6 +139,26 @@ def test_without_static_transforms_the_others_hold(here: Path) -> None:
     write_log(here / "log.mcap", [*moved[:6], beside, *moved[6:]])
     cut(here, "log.mcap", "out.mcap")
     assert "mast" not in str(of_topic(here / "out.mcap", TF.topic))
+
+
+@pytest.mark.parametrize(
+    ("topic", "kind", "durability", "lasts"),
+    [
+        ("/map", "nav_msgs/msg/OccupancyGrid", "1", True),
+        ("/map", "nav_msgs/msg/OccupancyGrid", "transient_local", True),
+        ("/map", "nav_msgs/msg/OccupancyGrid", "2", False),
+        ("/map", "nav_msgs/msg/OccupancyGrid", "volatile", False),
+        ("/robot1/tf_static", "tf2_msgs/msg/TFMessage", "2", True),
+        ("/tf_static", "std_msgs/msg/String", "2", False),
+        ("/left/camera_info", "sensor_msgs/msg/CameraInfo", "2", True),
+        ("/rosout", "rcl_interfaces/msg/Log", "1", False),
+        ("/add/_service_event", "example_interfaces/srv/AddTwoInts_Event", "1", False),
+    ],
+)
+def test_what_lasts(topic: str, kind: str, durability: str, lasts: bool) -> None:
+    several = f"- history: 1\n  durability: 2\n  depth: 1\n- history: 1\n  durability: {durability}\n  depth: 1"
+    connection = Connection(topic, kind, b"", metadata={KEY: several})
+    assert lasting([connection]) == [connection] * lasts
 
 
 def test_whole_logs_and_results_alone_carry_nothing(here: Path) -> None:

@@ -11,14 +11,18 @@ from toolkit.messages.qos import KEY
 from toolkit.messages.transforms import TFMessage
 from toolkit.stage import Connection, RawMessage
 
+_LOG_TYPES = frozenset({"rcl_interfaces/msg/Log", "rosgraph_msgs/msg/Log"})
+_SERVICE_EVENTS = "/_service_event"
 _TRANSIENT_LOCAL = re.compile(r"\bdurability:\s*(?:1|transient_local)\s*$", re.MULTILINE)
 
 
 def lasting(connections: Iterable[Connection]) -> list[Connection]:
     """The connections whose messages hold until the next one comes.
 
-    These are camera information, static transforms and whatever else was latched. Where a log has no static transforms
-    all of its transforms count, since ROS 1 and some drivers publish those of the sensors' mounting among the others.
+    These are camera information, static transforms and whatever else was latched, but for logs and service events,
+    which are latched so that none is missed: they tell what happened at a time, and not what holds from then on.
+    Where a log has no static transforms all of its transforms count, since ROS 1 and some drivers publish those of the
+    sensors' mounting among the others.
     """
     every = list(connections)
     found = [connection for connection in every if _is_lasting(connection)]
@@ -28,6 +32,8 @@ def lasting(connections: Iterable[Connection]) -> list[Connection]:
 
 
 def _is_lasting(connection: Connection) -> bool:
+    if connection.message_type in _LOG_TYPES or connection.topic.endswith(_SERVICE_EVENTS):
+        return False
     is_static = connection.topic.endswith(TF_STATIC.topic) and connection.message_type == TFMessage.ROS_TYPE
     latched = _TRANSIENT_LOCAL.search(connection.metadata.get(KEY, ""))
     return is_static or latched is not None or connection.message_type == CameraInfo.ROS_TYPE
