@@ -39,6 +39,9 @@ def test_method_counts_for_every_stage() -> None:
         (["fuse.sizes.dog={top_m=[0, 1], width_m=[0, 1], radus_m=0.1, radius_m=0.1}"], "did you mean radius_m"),
         (["cluster.shapes.dog=[{kind='disc', radius_m=0.1, colour=1}]"], "colour is no setting of cluster.shapes.dog"),
         (["localize=3"], "write STAGE.KEY=VALUE"),
+        (["cluster.range_m=[15, 0.5]"], "give the lower number first"),
+        (["cluster.slice_m=[0.3, 0.3]"], "give the lower number first"),
+        (["fuse.landmark_classes=person"], r'give a list, such as \["person", "suitcase"\]'),
     ],
 )
 def test_wrong_settings_name_the_remedy(settings: list[str], words: str) -> None:

@@ -133,7 +133,12 @@ def test_a_slice_of_a_cloud_is_a_scan() -> None:
 
 
 def drive(
-    velocity: Array, count: int, rng: np.random.Generator, turn_s: float = 0.2, stamped_s: float | None = None
+    velocity: Array,
+    count: int,
+    rng: np.random.Generator,
+    turn_s: float = 0.2,
+    stamped_s: float | None = None,
+    is_stamped: bool = True,
 ) -> list[Bundle]:
     """Scans of a robot that drives and turns, each beam at its time, associated with odometry.
 
@@ -151,7 +156,7 @@ def drive(
         times = (start - SECOND) / 1e9 + turn_s * np.arange(360) / 360
         poses = exp(times[:, None] * velocity)
         distances = ranges(THINGS, rng, base_from_lidar=poses)
-        message: Message = scan(distances, start, turn_s=turn_s)
+        message: Message = scan(distances, start if is_stamped else 0, turn_s=turn_s)
         if stamped_s is not None:
             message = cloud_of(distances, start + round(stamped_s * SECOND), turn_s, stamped_s)
         messages.append((SCAN, start + int(turn_s * SECOND), message))
@@ -176,6 +181,14 @@ def test_motion_under_a_scan_or_cloud_is_taken_out(stamped_s: float | None) -> N
         pose = exp(velocity * (one.stamp_ns - SECOND) / 1e9)
         truth = transform_points(compose(exp(-velocity * (one.stamp_ns - SECOND) / 1e9), np.zeros(3)), [3.0, 0.6])
         np.testing.assert_allclose(transform_points(pose, truth), [3.0, 0.6], atol=1e-9)
+        np.testing.assert_allclose(places(found, "fire hydrant")[0], truth, atol=0.03)
+
+
+def test_a_scan_without_a_stamp_was_logged_after_its_turn() -> None:
+    velocity = np.array([0.3, 0.0, 1.2])
+    for one in drive(velocity, 3, np.random.default_rng(1), is_stamped=False):
+        (found,) = results([one])
+        truth = transform_points(exp(-velocity * (one.stamp_ns - SECOND) / 1e9), [3.0, 0.6])
         np.testing.assert_allclose(places(found, "fire hydrant")[0], truth, atol=0.03)
 
 
@@ -209,6 +222,10 @@ def test_limits_of_range_and_view() -> None:
     (near,) = results([one], ClusterConfig(range_m=(0.0, 2.8)))
     assert [len(found) for found in (left, near)] == [1, 1]
     assert left.positions_xy[0][-1][1] > 0 > near.positions_xy[0][-1][1]
+    (one_way,), (other_way,) = (results([one], ClusterConfig(view_deg=view)) for view in ((330.0, 5.0), (-30.0, 5.0)))
+    assert len(one_way) == len(other_way) == 1
+    np.testing.assert_array_equal(one_way.positions_xy[0], other_way.positions_xy[0])
+    np.testing.assert_allclose(places(one_way, "suitcase"), [[2.5, -1.0]], atol=0.02)
 
 
 def test_a_scan_of_nothing_is_a_message_of_nothing() -> None:

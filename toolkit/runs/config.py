@@ -59,6 +59,10 @@ def declaration(name: str) -> Declaration:
     return Declaration(stage.config, files)
 
 
+_WORDS = {"tuple_type": 'give a list, such as ["person", "suitcase"] or [0.1, 0.3]'}
+"""What pydantic says in terms of Python, in terms of TOML."""
+
+
 def _from_file(path: Path) -> Settings:
     try:
         tables = tomllib.loads(path.read_text())
@@ -104,7 +108,7 @@ def stage_config(config: type[Any], stage: str, settings: Mapping[str, Any]) -> 
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join([stage, *(str(part) for part in first["loc"])])
-        raise UsageError(f"{where} = {first['input']!r}: {first['msg']}") from error
+        raise UsageError(f"{where} = {first['input']!r}: {_WORDS.get(first['type'], first['msg'])}") from error
     _all_taken(settings, effective(made), stage)
     return made
 

@@ -1,5 +1,7 @@
 """Scans and point clouds of a bundle as beams in the base frame."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,8 +73,9 @@ def makes_sense(scan: LaserScan) -> bool:
 def _limits(config: ClusterConfig) -> Limits:
     if config.view_deg is None:
         return Limits(config.range_m or (0.0, np.inf))
-    low, high = np.deg2rad(config.view_deg).tolist()
-    return Limits(config.range_m or (0.0, np.inf), (low, high))
+    low, high = config.view_deg
+    across = high - low if high > low else (high - low) % 360.0  # 330 to 30 is what -30 to 30 is
+    return Limits(config.range_m or (0.0, np.inf), (math.radians(low), math.radians(low + across)))
 
 
 def _sweep(scan: LaserScan, bundle: Bundle, base_from_lidar: Array, limits: Limits) -> Beams:
@@ -88,7 +91,8 @@ def _sweep(scan: LaserScan, bundle: Bundle, base_from_lidar: Array, limits: Limi
 
 def _times_ns(scan: LaserScan, stamp_ns: int) -> NDArray[np.int64]:
     """When each beam (N,) was; all at once where the scan does not say."""
-    first_ns, count = scan.stamp_ns or stamp_ns, len(scan.ranges_m)
+    first_ns = scan.stamp_ns or stamp_ns - scan.duration_ns  # without a stamp the log time counts, of a whole turn
+    count = len(scan.ranges_m)
     return first_ns + np.arange(count, dtype=np.int64) * scan.duration_ns // max(count - 1, 1)
 
 

@@ -4,13 +4,22 @@ import math
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field
 
 from toolkit.lidar import shapes
 from toolkit.lidar.shapes import Shape
 
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(gt=0, lt=1)]
+
+
+def _rising(span: tuple[float, float]) -> tuple[float, float]:
+    if not span[0] < span[1]:
+        raise ValueError("nothing is between these; give the lower number first")
+    return span
+
+
+Rising = Annotated[tuple[float, float], AfterValidator(_rising)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,9 +137,9 @@ class ClusterConfig:
     link_m: Positive = 0.3
     near_m: Positive = 0.13
     largest_m: Positive | None = None
-    range_m: tuple[float, float] | None = None
+    range_m: Rising | None = None
     view_deg: tuple[float, float] | None = None
     gate_m: Positive = 0.5
     memory_s: Positive = 10.0
-    slice_m: tuple[float, float] | None = None
+    slice_m: Rising | None = None
     slice_beam_deg: Annotated[float, Field(gt=0, le=10)] = 0.5
