@@ -1,8 +1,7 @@
 """Localize where every landmark has a class of its own: associate by class, solve in SE(2), test, refuse."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol, Self
+from collections.abc import Callable, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +10,15 @@ from scipy.stats import chi2
 from toolkit.estimation.batch import PoseSolutions
 from toolkit.estimation.calibration import SensorModel, calibrate
 from toolkit.estimation.pose import solve_poses
-from toolkit.estimation.sightings import polar_from_points
 from toolkit.geometry.se2 import Array, transform_points
 from toolkit.landmarks.model import LandmarkMap
 from toolkit.landmarks.plausible import check_scale
-from toolkit.landmarks.sightings import known_covariances
 from toolkit.landmarks.unique import pairs_by_class, unique_classes
 from toolkit.landmarks.verdicts import Match
 from toolkit.messages.match import LandmarkMatch, Status
 from toolkit.messages.scene import SceneObjects
+from toolkit.stages._localize_given import Bools, Given, Problem, Rows
+from toolkit.stages._localize_one_kind import LEAST, by_bearings, locate_by_ranges
 
 
 class Settings(Protocol):
@@ -39,44 +38,8 @@ class Settings(Protocol):
     def consistency(self) -> float: ...
     @property
     def calibrate(self) -> bool: ...
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Problem:
-    """Objects (K,) of one scene and the landmarks (K,) they are taken for."""
-
-    scene: SceneObjects
-    objects: NDArray[np.int64]
-    landmarks: NDArray[np.int64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Given:
-    """Problems as arrays (B, K), padded to the largest; `mask` says what is there. See `solve_poses`."""
-
-    landmarks_xy: Array
-    landmark_covariance: Array
-    range_m: Array
-    bearing_rad: Array
-    covariance: Array
-    mask: NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, problems: Sequence[_Problem], landmark_map: LandmarkMap, settings: Settings) -> Self:
-        """Arrays of B problems."""
-        count, width = len(problems), max(len(problem.objects) for problem in problems)
-        points, covariances = np.ones((count, width, 2)), np.tile(np.eye(2), (count, width, 1, 1))
-        landmarks, spread = np.zeros((count, width, 2)), np.zeros((count, width, 2, 2))
-        mask = np.zeros((count, width), dtype=np.bool_)
-        for i, problem in enumerate(problems):
-            k = len(problem.objects)
-            mask[i, :k] = True
-            points[i, :k] = problem.scene.positions_xy[problem.objects]
-            known = known_covariances(problem.scene, settings.range_sigma_m, settings.bearing_sigma_rad)
-            covariances[i, :k] = known[problem.objects]
-            landmarks[i, :k] = landmark_map.positions_xy[problem.landmarks]
-            spread[i, :k] = landmark_map.covariances[problem.landmarks]
-        return cls(landmarks, spread, *polar_from_points(points, covariances), mask)
+    @property
+    def accidental(self) -> float: ...
 
 
 class UniqueLocator:
@@ -90,22 +53,48 @@ class UniqueLocator:
 
     def locate(self, scenes: Sequence[SceneObjects]) -> list[Match]:
         """Pose of each scene's base in the map, from the landmarks whose class is unique."""
-        problems = [_Problem(scene, *pairs_by_class(scene.classes, self._landmark_of)) for scene in scenes]
+        problems = [Problem(scene, *pairs_by_class(scene.classes, self._landmark_of)) for scene in scenes]
         located = [_too_few(problem) for problem in problems]
         rows = [i for i, result in enumerate(located) if result is None]
         if rows:
-            for i, result in zip(rows, self._solve([problems[i] for i in rows]), strict=True):
+            for i, result in zip(rows, self._located([problems[i] for i in rows]), strict=True):
                 located[i] = result
         return [result for result in located if result is not None]
 
-    def _solve(self, problems: Sequence[_Problem]) -> list[Match]:
+    def _located(self, problems: Sequence[Problem]) -> list[Match]:
+        """Locate all, those of ranges or bearings alone as such."""
+        given = Given.of(problems, self._map, self._settings)
+        ranges, bearings = given.ranges_alone(), given.bearings_alone()
+        many = given.mask.sum(axis=1) >= LEAST
+        few = np.flatnonzero((ranges | bearings) & ~many).tolist()
+        found = {i: _none(problems[i]) for i in few}
+
+        def put(chosen: Bools, solve: Callable[[Sequence[Problem], Given], list[Match]]) -> None:
+            rows = np.flatnonzero(chosen)
+            if len(rows):
+                which = rows.tolist()
+                found.update(zip(which, solve([problems[i] for i in which], given.pick(rows)), strict=True))
+
+        put(~ranges & ~bearings, self._solve)
+        put(bearings & many, self._by_bearings)
+        put(ranges & many, lambda chosen, part: locate_by_ranges(chosen, part, self._map, self._settings))
+        return [found[i] for i in range(len(problems))]
+
+    def _by_bearings(self, problems: Sequence[Problem], given: Given) -> list[Match]:
+        solved, mask, fits = _fitting(lambda mask: by_bearings(given, mask)[0], given.mask, LEAST, self._settings)
+        distance_m = by_bearings(given, mask)[1]
+        return [
+            _judge(problem, i, solved, mask[i], distance_m[i], bool(fits[i]), self._map, self._settings)
+            for i, problem in enumerate(problems)
+        ]
+
+    def _solve(self, problems: Sequence[Problem], given: Given) -> list[Match]:
         """Solve all; drop the worst observation of those that do not fit while three or more are left.
 
         Raises:
             MapError: map and log are in different units.
         """
         settings = self._settings
-        given = _Given.of(problems, self._map, settings)
         check_scale(
             [problem.scene.positions_xy[problem.objects] for problem in problems],
             [self._map.positions_xy[problem.landmarks] for problem in problems],
@@ -123,9 +112,9 @@ class UniqueLocator:
         # The log tells how range and bearing compare; in all, sigmas stay as large as they are given.
         shape = self._sensor.scale / self._sensor.scale.max()
         noise = given.covariance * np.outer(shape, shape)
-        mask = given.mask.copy()
-        while True:
-            solutions = solve_poses(
+
+        def solve(mask: Bools) -> PoseSolutions:
+            return solve_poses(
                 given.landmarks_xy,
                 distance_m,
                 given.bearing_rad,
@@ -134,28 +123,43 @@ class UniqueLocator:
                 mask=mask,
                 robust_dof=settings.robust_dof or None,
             )
-            fits = solutions.chi2 <= chi2.ppf(1 - settings.consistency, np.maximum(solutions.dof, 1))
-            worse = np.flatnonzero(~fits & (mask.sum(axis=1) > 2))
-            if not len(worse):
-                break
-            mask[worse, np.argmax(np.where(mask, solutions.observation_chi2, -1.0)[worse], axis=1)] = False
+
+        solutions, mask, fits = _fitting(solve, given.mask, 2, settings)
         return [
             _judge(problem, i, solutions, mask[i], distance_m[i], bool(fits[i]), self._map, settings)
             for i, problem in enumerate(problems)
         ]
 
 
-def _too_few(problem: _Problem) -> Match | None:
+def _fitting(
+    solve: Callable[[Bools], PoseSolutions], mask: Bools, least: int, settings: Settings
+) -> tuple[PoseSolutions, Bools, Bools]:
+    """Solutions without the worst of what does not fit, of which `least` stay; what (B, K) stays; who (B,) fits."""
+    mask = mask.copy()
+    while True:
+        solutions = solve(mask)
+        fits = solutions.chi2 <= chi2.ppf(1 - settings.consistency, np.maximum(solutions.dof, 1))
+        worse: Rows = np.flatnonzero(~fits & (mask.sum(axis=1) > least))
+        if not len(worse):
+            return solutions, mask, fits
+        mask[worse, np.argmax(np.where(mask, solutions.observation_chi2, -1.0)[worse], axis=1)] = False
+
+
+def _none(problem: Problem) -> Match:
+    return Match(LandmarkMatch(problem.scene.stamp_ns, problem.scene.frame_id, Status.TOO_FEW_OBJECTS))
+
+
+def _too_few(problem: Problem) -> Match | None:
     scene = problem.scene
     if len(set(scene.classes)) < 2:
-        return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, Status.TOO_FEW_OBJECTS))
+        return _none(problem)
     if len(problem.objects) < 2:
         return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, Status.NO_MATCH))
     return None
 
 
 def _judge(
-    problem: _Problem,
+    problem: Problem,
     i: int,
     solutions: PoseSolutions,
     used: NDArray[np.bool_],

@@ -51,7 +51,8 @@ class LocalizeConfig:
     Where every class stands for one landmark: `robust_dof`, degrees of the Student-t distribution that observations
     weigh by (0 weighs them by their covariance alone); `consistency`, the probability under which a set of objects that
     do fit is refused; `calibrate` finds from the first bundles whether ranges are distances or depths, and their
-    offset, and corrects them where that explains far more than chance.
+    offset, and corrects them where that explains far more than chance. Objects whose covariance leaves the bearing open
+    (a sigma beyond a radian) or the range (beyond the range itself) count by what is left, three of them or more.
 
     Where classes repeat: `accidental`, the most accidental matches to expect of a match that is accepted; `join_m`,
     over how many metres bundles are matched together (0: each alone), through odometry whose noise per square root of
@@ -122,7 +123,7 @@ def _messages(bundle: Bundle, match: Match, frame: str, config: LocalizeConfig) 
     if match.message.status != Status.LOCALIZED or match.pose is None:
         return
     pose, stamp_ns = match.pose, bundle.stamp_ns
-    if match.covariance is None:  # the thesis's solver knows no heading, and an all-zero quaternion says so
+    if match.covariance is None:  # no heading is known, and an all-zero quaternion says so
         position = np.array([pose[0], pose[1], 0.0])
         yield Stamped(POSE, bundle.log_time_ns, PoseStamped(stamp_ns, frame, position, np.zeros(4)))
         return
