@@ -7,6 +7,7 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import table
+from toolkit.cli.groups import LogOptions, ScanOptions
 from toolkit.cli.stage_runs import Given, finish, run_over
 
 if TYPE_CHECKING:
@@ -16,26 +17,13 @@ if TYPE_CHECKING:
 def command(
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP) with LiDAR scans.")],
     output: options.Output,
-    scan: options.ScanTopics = None,
-    scan_from: options.ScanFrom = None,
-    heights: options.Slice = None,
+    scans: ScanOptions,
+    given: LogOptions,
     extrinsics: options.Extrinsics = None,
-    config_file: options.ConfigFile = None,
-    settings: options.Settings = None,
-    method: options.Method = None,
-    start: options.Start = None,
-    end: options.End = None,
-    remap: options.Remap = None,
-    odom: options.OdometryTopic = None,
-    results_only: options.ResultsOnly = False,
-    force: options.Force = False,
-    json: options.Json = False,
 ) -> None:
     """Find the objects in the scans of LOG...; write the input with what each could be and where its centre is then."""
-    span = options.span(start, end, remap, {"odometry": odom, "scan": options.scans(scan, scan_from)})
-    configured = config_file, options.sliced(settings, heights), method
-    given = Given(configured, span, {"extrinsics": extrinsics}, None, results_only, force)
-    finish("cluster", run_over("cluster", ["cluster"], logs, output, given), _document, _print, json)
+    asked = Given(given, scans=scans, files={"extrinsics": extrinsics})
+    finish("cluster", run_over("cluster", ["cluster"], logs, output, asked), _document, _print, given.json)
 
 
 def _document(run: "LogRun") -> dict[str, object]:

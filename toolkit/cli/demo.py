@@ -19,18 +19,19 @@ def command(
     """
     from toolkit.cli import evaluate, localize, plot
     from toolkit.cli import map as build
+    from toolkit.cli.groups import ImageOptions, LogOptions, ScanOptions
     from toolkit.resources import resource
     from toolkit.runs.outputs import make_folder
 
     make_folder(output)
     seen, asked = resource("recordings", "demo_map.mcap"), resource("recordings", "demo_localize.mcap")
     database, mapped, localized = output / "map.db", output / "mapped.mcap", output / "localized.mcap"
-    picture = output / "localized.png"
+    picture, given = output / "localized.png", (ImageOptions(), ScanOptions(), LogOptions())
 
     say(f"$ mcap-landmarks map {seen} --map {database} -o {mapped}")
-    build.command([seen], database, mapped)
+    build.command([seen], database, *given, output=mapped)
     say(f"\n$ mcap-landmarks localize {asked} --map {database} -o {localized}")
-    localize.command([asked], database, localized)
+    localize.command([asked], database, *given, output=localized)
     say(f"\n$ mcap-landmarks evaluate {localized} --align")
     evaluate.command(localized, align=True)
     say(f"\n$ mcap-landmarks plot {localized} --align -o {picture}")

@@ -7,6 +7,7 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import say, table
+from toolkit.cli.groups import ImageOptions, LogOptions
 from toolkit.cli.stage_runs import Given, finish, run_over
 
 if TYPE_CHECKING:
@@ -16,27 +17,13 @@ if TYPE_CHECKING:
 def command(
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP) with camera images.")],
     output: options.Output,
-    model: options.Model = None,
+    images: ImageOptions,
+    given: LogOptions,
     names: options.Names = None,
-    config_file: options.ConfigFile = None,
-    settings: options.Settings = None,
-    method: options.Method = None,
-    start: options.Start = None,
-    end: options.End = None,
-    remap: options.Remap = None,
-    image: options.ImageTopic = None,
-    odom: options.OdometryTopic = None,
-    image_rate: options.ImageRate = None,
-    every: options.Every = None,
-    results_only: options.ResultsOnly = False,
-    force: options.Force = False,
-    json: options.Json = False,
 ) -> None:
     """Detect objects in the camera images of LOG...; write the input with detections and annotations."""
-    span = options.span(start, end, remap, {"image": image, "odometry": odom})
-    files, thinning = {"model": model, "names": names}, options.thinning(image_rate, every)
-    given = Given((config_file, settings, method), span, files, thinning, results_only, force)
-    finish("detect", run_over("detect", ["detect"], logs, output, given), _document, _print, json)
+    runs = run_over("detect", ["detect"], logs, output, Given(given, images, files={"names": names}))
+    finish("detect", runs, _document, _print, given.json)
 
 
 def _document(run: "LogRun") -> dict[str, object]:

@@ -7,6 +7,7 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import say, table
+from toolkit.cli.groups import LogOptions
 from toolkit.cli.stage_runs import Given, finish, run_over
 
 if TYPE_CHECKING:
@@ -18,22 +19,12 @@ def command(
         list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP) with detections and scan objects.")
     ],
     output: options.Output,
+    given: LogOptions,
     extrinsics: options.Extrinsics = None,
-    config_file: options.ConfigFile = None,
-    settings: options.Settings = None,
-    method: options.Method = None,
-    start: options.Start = None,
-    end: options.End = None,
-    remap: options.Remap = None,
-    odom: options.OdometryTopic = None,
-    results_only: options.ResultsOnly = False,
-    force: options.Force = False,
-    json: options.Json = False,
 ) -> None:
     """Give the objects in the scans of LOG... the classes that its detections have; write the input with scenes."""
-    span = options.span(start, end, remap, {"odometry": odom})
-    given = Given((config_file, settings, method), span, {"extrinsics": extrinsics}, None, results_only, force)
-    finish("fuse", run_over("fuse", ["fuse"], logs, output, given), _document, _print, json)
+    runs = run_over("fuse", ["fuse"], logs, output, Given(given, files={"extrinsics": extrinsics}))
+    finish("fuse", runs, _document, _print, given.json)
 
 
 def _document(run: "LogRun") -> dict[str, object]:

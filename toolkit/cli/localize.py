@@ -8,6 +8,7 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import PARTIAL, moment, progress, say, say_json, table, warn
+from toolkit.cli.groups import ImageOptions, LogOptions, ScanOptions
 from toolkit.cli.stage_runs import Given, finish, run_over
 from toolkit.errors import UsageError
 
@@ -20,48 +21,31 @@ if TYPE_CHECKING:
 def command(
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP).")],
     map_file: options.MapFile,
+    images: ImageOptions,
+    scans: ScanOptions,
+    given: LogOptions,
     output: options.MaybeOutput = None,
     at: Annotated[
         str | None,
         typer.Option("--at", help="Answer for this moment only, and write nothing: RFC 3339 or nanoseconds."),
     ] = None,
-    config_file: options.ConfigFile = None,
-    settings: options.Settings = None,
-    method: options.Method = None,
-    start: options.Start = None,
-    end: options.End = None,
-    remap: options.Remap = None,
-    odom: options.OdometryTopic = None,
-    scan: options.ScanTopics = None,
-    scan_from: options.ScanFrom = None,
-    heights: options.Slice = None,
-    image: options.ImageTopic = None,
-    model: options.Model = None,
     extrinsics: options.Extrinsics = None,
-    image_rate: options.ImageRate = None,
-    every: options.Every = None,
-    results_only: options.ResultsOnly = False,
-    force: options.Force = False,
-    json: options.Json = False,
 ) -> None:
     """Localize every bundle of LOG... in a landmark map; write the input with pose and match.
 
     Where a log has no scene objects, they are made first, from images and scans.
     """
-    span = options.span(start, end, remap, {"odometry": odom, "scan": options.scans(scan, scan_from), "image": image})
-    configured = config_file, options.sliced(settings, heights), method
+    asked = Given(given, images, scans, {"map": map_file, "extrinsics": extrinsics})
     asked_ns = options.time_ns(at, "--at")
-    files = {"map": map_file, "model": model, "extrinsics": extrinsics}
-    given = Given(configured, span, files, options.thinning(image_rate, every), results_only, force)
     if asked_ns is not None:
         if output is not None or len(logs) > 1:
             raise UsageError("--at prints one answer for one log: leave -o out, and name a single log")
-        _at(logs[0], asked_ns, given, json)
+        _at(logs[0], asked_ns, asked, given.json)
         return
     if output is None:
         raise UsageError("localize needs -o FILE to write to, or --at TIME for one answer")
-    runs = run_over("localize", ["localize"], logs, output, given, lacking=True)
-    finish("localize", runs, _document, _print, json)
+    runs = run_over("localize", ["localize"], logs, output, asked, lacking=True)
+    finish("localize", runs, _document, _print, given.json)
 
 
 def _document(run: "LogRun") -> dict[str, object]:

@@ -9,9 +9,10 @@ from typing import Annotated
 import typer
 
 from toolkit.cli.console import run_command
+from toolkit.cli.groups import spread
 from toolkit.errors import UsageError
 
-_NOT_VERBS = {"__init__", "main", "console", "options", "stage_runs"}
+_NOT_VERBS = {"__init__", "main", "console", "groups", "options", "stage_runs"}
 _HELP = "Landmark maps and positions from robot recordings, offline and without ROS."
 
 
@@ -44,8 +45,8 @@ def build(asked: str | None) -> typer.Typer:
         if hasattr(module, "app"):
             app.add_typer(module.app, name=verb, help=short_help)
         else:
-            settings = getattr(module, "context_settings", None)
-            app.command(verb, help=module.command.__doc__ or short_help, context_settings=settings)(module.command)
+            settings, command = getattr(module, "context_settings", None), spread(module.command)
+            app.command(verb, help=command.__doc__ or short_help, context_settings=settings)(command)
     return app
 
 

@@ -7,6 +7,7 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import PARTIAL, progress, say, say_json, table
+from toolkit.cli.groups import ImageOptions, LogOptions, ScanOptions
 from toolkit.cli.stage_runs import Given, tell, told
 from toolkit.errors import UsageError
 
@@ -18,44 +19,28 @@ if TYPE_CHECKING:
 def command(
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP) with odometry.")],
     map_file: options.MapFile,
+    images: ImageOptions,
+    scans: ScanOptions,
+    given: LogOptions,
     output: options.MaybeOutput = None,
     from_reference: Annotated[
         bool, typer.Option("--from-reference", help="Take the map from LOG's /ground_truth/objects (a surveyed map).")
     ] = False,
     prior: Annotated[Path | None, typer.Option("--prior", help="Landmark database to extend and refine.")] = None,
-    config_file: options.ConfigFile = None,
-    settings: options.Settings = None,
-    method: options.Method = None,
-    start: options.Start = None,
-    end: options.End = None,
-    remap: options.Remap = None,
-    odom: options.OdometryTopic = None,
-    scan: options.ScanTopics = None,
-    scan_from: options.ScanFrom = None,
-    heights: options.Slice = None,
-    image: options.ImageTopic = None,
-    model: options.Model = None,
     extrinsics: options.Extrinsics = None,
-    image_rate: options.ImageRate = None,
-    every: options.Every = None,
-    results_only: options.ResultsOnly = False,
-    force: options.Force = False,
-    json: options.Json = False,
 ) -> None:
     """Build one landmark map from LOG...; with -o also write each log with its results.
 
     Where a log has no scene objects, they are made first, from images and scans.
     """
     if from_reference:
-        _from_reference(logs, map_file, json)
+        _from_reference(logs, map_file, given.json)
         return
-    span = options.span(start, end, remap, {"odometry": odom, "scan": options.scans(scan, scan_from), "image": image})
-    files = {"model": model, "extrinsics": extrinsics}
-    configured, thinning = (config_file, options.sliced(settings, heights), method), options.thinning(image_rate, every)
-    run = _build(logs, map_file, prior, output, Given(configured, span, files, thinning, results_only, force))
+    asked = Given(given, images, scans, {"extrinsics": extrinsics})
+    run = _build(logs, map_file, prior, output, asked)
     for log in run.logs:
         tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)
-    if json:
+    if given.json:
         say_json("map", _document(run, map_file))
     else:
         _print(run, map_file)

@@ -3,15 +3,11 @@
 import re
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from toolkit.errors import UsageError
-
-if TYPE_CHECKING:
-    from toolkit.runs.bundles import Span
-    from toolkit.runs.thinning import Thinning
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of text.")]
 Output = Annotated[
@@ -23,7 +19,10 @@ MaybeOutput = Annotated[
 MapFile = Annotated[Path, typer.Option("--map", help="Landmark database (SQLite file).")]
 MaybeMapFile = Annotated[Path | None, typer.Option("--map", help="Landmark database (SQLite file).")]
 ResultsOnly = Annotated[bool, typer.Option("--results-only", help="Write the new channels without the input's.")]
-Start = Annotated[str | None, typer.Option("--start", help="First log time: RFC 3339 or integer nanoseconds.")]
+Start = Annotated[
+    str | None,
+    typer.Option("--start", help="First log time: RFC 3339 or integer nanoseconds. What holds then comes along."),
+]
 End = Annotated[str | None, typer.Option("--end", help="Log time to stop before: RFC 3339 or integer nanoseconds.")]
 Remap = Annotated[list[str] | None, typer.Option("--remap", metavar="FROM=TO", help="Read topic FROM as TO.")]
 OdometryTopic = Annotated[str | None, typer.Option("--odom", help="Odometry topic, where the log has several.")]
@@ -56,66 +55,6 @@ Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="STAGE.KEY=VALUE", help="One setting; repeatable.")
 ]
 Method = Annotated[str | None, typer.Option("--method", help="Sets the method of every stage: default or thesis.")]
-
-
-def span(
-    start: str | None, end: str | None, remaps: list[str] | None, topics: dict[str, str | list[str] | None]
-) -> "Span":
-    """What of a log to read, from the options; `topics` by role, None where none was chosen, of scans up to two.
-
-    Raises:
-        UsageError: a time or a remapping cannot be read, or there are too many topics.
-    """
-    from toolkit.runs.bundles import Span
-    from toolkit.runs.inputs import Choice, parse_remaps
-
-    chosen = {role: topic for role, topic in topics.items() if isinstance(topic, str) and topic}
-    for role, several in topics.items():
-        if isinstance(several, list):
-            if len(several) > 2:
-                raise UsageError(f"--{role} {' '.join(several)}: two are the most that are merged")
-            chosen.update(zip((role, f"second_{role}"), several, strict=False))
-    return Span(Choice(chosen, parse_remaps(remaps or [])), time_ns(start, "--start"), time_ns(end, "--end"))
-
-
-def scans(topics: list[str] | None, cloud: str | None) -> list[str] | None:
-    """The topics to read scans from.
-
-    Raises:
-        UsageError: both are given.
-    """
-    if topics and cloud:
-        raise UsageError("--scan-from takes the place of --scan; to merge a scan and a cloud give both with --scan")
-    return [cloud] if cloud else topics
-
-
-def sliced(settings: list[str] | None, heights: str | None) -> list[str]:
-    """The settings with the one that a slice of a point cloud stands for.
-
-    Raises:
-        UsageError: the heights cannot be read.
-    """
-    if heights is None:
-        return settings or []
-    low, colon, high = heights.partition(":")
-    try:
-        slice_m = (float(low), float(high)) if colon else (0.0, 0.0)
-    except ValueError:
-        slice_m = (0.0, 0.0)
-    if not slice_m[0] < slice_m[1]:
-        raise UsageError(f"--slice {heights}: give two heights in metres, the lower one first, such as 0.1:0.3")
-    return [*(settings or []), f"cluster.slice_m=[{slice_m[0]}, {slice_m[1]}]"]
-
-
-def thinning(rate_hz: float | None, every: str | None) -> "Thinning":
-    """Which images are left out.
-
-    Raises:
-        UsageError: an option cannot be read.
-    """
-    from toolkit.runs.thinning import parse_thinning
-
-    return parse_thinning(rate_hz, every)
 
 
 def time_ns(text: str | None, option: str) -> int | None:

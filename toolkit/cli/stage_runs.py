@@ -8,42 +8,47 @@ from typing import TYPE_CHECKING
 import typer
 
 from toolkit.cli.console import PARTIAL, progress, say_json, warn
+from toolkit.cli.groups import ImageOptions, LogOptions, ScanOptions
+from toolkit.cli.options import time_ns
 
 if TYPE_CHECKING:
     from toolkit.runs.bench import StageRun
     from toolkit.runs.bundles import Span
     from toolkit.runs.pipeline import LogRun
     from toolkit.runs.plan import Request
-    from toolkit.runs.thinning import Thinning
-
-Configured = tuple[Path | None, list[str] | None, str | None]
-"""The options --config, --set and --method."""
 
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What the options of a verb say about all its logs; `files` are those that options gave, by resource name."""
+    """What the options of a verb say about all its logs; `files` are those beside the model, by resource name."""
 
-    configured: Configured
-    span: "Span"
+    options: LogOptions
+    images: ImageOptions = field(default_factory=ImageOptions)
+    scans: ScanOptions = field(default_factory=ScanOptions)
     files: Mapping[str, Path | None] = field(default_factory=dict)
-    thinning: "Thinning | None" = None
-    results_only: bool = False
-    force: bool = False
 
     def requests(self, logs: Sequence[Path]) -> "list[Request]":
         """What to do with each log.
 
         Raises:
-            UsageError: a setting is wrong.
+            UsageError: an option cannot be read, or a setting is wrong.
         """
         from toolkit.runs.config import gather
         from toolkit.runs.plan import Request
-        from toolkit.runs.thinning import Thinning
 
-        config_file, settings, method = self.configured
-        gathered, thinning = gather(config_file, settings or [], method), self.thinning or Thinning()
-        return [Request(log, gathered, self.files, self.span, thinning, self.results_only, self.force) for log in logs]
+        given, files = self.options, {"model": self.images.model, **self.files}
+        settings = gather(given.config_file, [*(given.settings or []), *self.scans.settings()], given.method)
+        span, thinning = self._span(), self.images.thinning()
+        return [Request(log, settings, files, span, thinning, given.results_only, given.force) for log in logs]
+
+    def _span(self) -> "Span":
+        from toolkit.runs.bundles import Span
+        from toolkit.runs.inputs import Choice, parse_remaps
+
+        given, scans = self.options, dict(zip(("scan", "second_scan"), self.scans.topics() or (), strict=False))
+        topics = {"odometry": given.odom, "image": self.images.image, **scans}
+        choice = Choice({role: topic for role, topic in topics.items() if topic}, parse_remaps(given.remap or []))
+        return Span(choice, time_ns(given.start, "--start"), time_ns(given.end, "--end"))
 
 
 def run_over(
