@@ -158,10 +158,11 @@ def test_findings_are_told_with_what_to_do(tmp_path: Path, capsys: pytest.Captur
     findings = document(capsys, log, "--check")["findings"]
     assert [(finding["level"], finding["check"]) for finding in findings] == [
         ("problem", "frames"),
-        ("warning", "frames"),
+        ("problem", "frames"),
         ("warning", "frames"),
     ]
     assert run(log, "--check") == DONE
     said = capsys.readouterr().out
+    assert "problem: /scan: there are no transforms: nothing says where the LiDAR (base_scan) sits" in said
     assert "problem: /camera/camera_info: no transforms lead from camera to base_scan; record /tf_static" in said
     assert "warning: there is no odometry" in said

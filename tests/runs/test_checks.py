@@ -99,7 +99,7 @@ PLANTED: dict[str, tuple[Change, set[tuple[str, str, str]]]] = {
     ),
     "no transforms": (
         of(TF_STATIC, lambda _: None),
-        {("frames", "/scan", "taken to be where the LiDAR is"), ("frames", "/camera/camera_info", "from camera to")},
+        {("frames", "/scan", "nothing says where the LiDAR"), ("frames", "/camera/camera_info", "from camera to")},
     ),
     "no odometry": (of(ODOMETRY, lambda _: None), {("frames", "", "there is no odometry")}),
     "no camera_info": (of(CAMERA_INFO, lambda _: None), {("camera", "/camera/image_raw/compressed", "no camera_info")}),

@@ -191,8 +191,12 @@ def _frames(found: Survey) -> Iterator[Finding]:
     scans = [sensor for sensor in found.of("scan") if sensor.frame]
     if base is None and scans:
         base = scans[0].frame
-        text = f"no transforms lead from {base} to a base frame: the robot is taken to be where the LiDAR is"
-        yield Finding("warning", "frames", scans[0].topic, text, REMEDY)
+        if found.edges or base in _BASES:
+            text = f"no transforms lead from {base} to a base frame: the robot is taken to be where the LiDAR is"
+            yield Finding("warning", "frames", scans[0].topic, text, REMEDY)
+        else:
+            text = f"there are no transforms: nothing says where the LiDAR ({base}) sits on the robot"
+            yield Finding("problem", "frames", scans[0].topic, text, REMEDY)
     reached = connected(found.edges, base or _BASES[0])
     for sensor in (*(found.of("camera_info") or found.of("image")), *scans):
         if sensor.frame and sensor.frame not in reached:
