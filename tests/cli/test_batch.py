@@ -6,8 +6,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from tests.cli.calls import call, schema_of
 from tests.cli.logs import messages, write
-from tests.cli.test_map_and_localize import call, schema_of
 from toolkit.recording.reader import open_recording
 
 

@@ -8,11 +8,11 @@ import jsonschema
 import numpy as np
 import pytest
 
+from tests.cli.calls import call, topics
 from tests.cli.logs import write
 from tests.lidar.scans import disc, ranges
 from tests.stages.test_cluster import mounting, scan
 from toolkit.channels import ODOMETRY, SCAN, SCAN_FILTERED, SCAN_OBJECTS, TF_STATIC
-from toolkit.cli.main import run
 from toolkit.messages.codec import decode
 from toolkit.messages.points import PointCloud2
 from toolkit.messages.poses import Odometry
@@ -26,12 +26,6 @@ from toolkit.stage import Channel, Stamped
 SCHEMA = json.loads(resource("schemas", "json/cluster.schema.json").read_text())
 SECOND = 10**9
 CLOUD = Channel("/points", PointCloud2)
-
-
-def call(*words: object) -> int:
-    with pytest.raises(SystemExit) as stop:
-        run([str(word) for word in words])
-    return int(stop.value.code or 0)
 
 
 def content(topics: Sequence[str] = (SCAN.topic,), count: int = 3) -> list[Stamped]:
@@ -59,11 +53,6 @@ def cloud() -> Stamped:
 def objects(path: Path) -> list[ScanObjects]:
     with open_recording(path) as recording:
         return [decode(ScanObjects, raw.data) for raw in recording.messages(recording.connections(SCAN_OBJECTS.topic))]
-
-
-def topics(path: Path) -> dict[str, int]:
-    with open_recording(path) as recording:
-        return {entry.connection.topic: entry.count for entry in recording.channels}
 
 
 def test_the_output_has_objects_beside_the_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

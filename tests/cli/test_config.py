@@ -7,14 +7,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from toolkit.cli.main import run
+from tests.cli.calls import call
 from toolkit.resources import resource
-
-
-def call(*words: object) -> int:
-    with pytest.raises(SystemExit) as stop:
-        run([str(word) for word in words])
-    return int(stop.value.code or 0)
 
 
 def test_what_is_in_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

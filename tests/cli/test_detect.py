@@ -10,10 +10,10 @@ import jsonschema
 import numpy as np
 import pytest
 
+from tests.cli.calls import call, topics
 from tests.cli.logs import write
 from tests.vision.networks import answering
 from toolkit.channels import CAMERA_IMAGE, CAMERA_INFO, DETECTIONS
-from toolkit.cli.main import run
 from toolkit.manifest import RUN
 from toolkit.messages.annotations import ImageAnnotations
 from toolkit.messages.codec import decode
@@ -25,13 +25,6 @@ from toolkit.stage import Channel, Stamped
 
 SECOND = 10**9
 SCHEMA: Any = json.loads(resource("schemas", "json/detect.schema.json").read_text())
-
-
-def call(*words: object) -> int:
-    """Exit code of the command line."""
-    with pytest.raises(SystemExit) as stop:
-        run([str(word) for word in words])
-    return int(stop.value.code or 0)
 
 
 def jpeg(i: int) -> bytes:
@@ -59,11 +52,6 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Path:
     output[0, :2] = (32, 32, 20, 20, 0.9, 1, 0), (16, 16, 8, 8, 0.5, 0, 1)
     folder = tmp_path_factory.mktemp("models")
     return answering(folder / "model.onnx", {"output0": output}, {"names": "['person', 'car']", "stride": "32"})
-
-
-def topics(path: Path) -> dict[str, int]:
-    with open_recording(path) as recording:
-        return {entry.connection.topic: entry.count for entry in recording.channels}
 
 
 def detected(tmp_path: Path, model: Path, content: Sequence[Stamped], *words: object) -> Path:

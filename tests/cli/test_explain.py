@@ -7,7 +7,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from tests.cli.test_map_and_localize import call, schema_of
+from tests.cli.calls import call, schema_of
 from tests.compare.recordings import START_NS, localized_log, localized_messages, write
 from toolkit.channels import CAMERA_IMAGE, DETECTIONS, SCAN, SCAN_OBJECTS, TF_STATIC
 from toolkit.messages.detections import Detections

@@ -8,8 +8,8 @@ import jsonschema
 import numpy as np
 import pytest
 
+from tests.cli.calls import call, refused
 from tests.cli.logs import messages, write
-from tests.cli.test_map_and_localize import call, refused
 from toolkit.channels import MATCH, POSE
 from toolkit.cli.console import moment
 from toolkit.landmarks.database import read_map, write_map

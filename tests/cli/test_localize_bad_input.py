@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.cli.calls import call, refused, topics
 from tests.cli.logs import messages, write
-from tests.cli.test_map_and_localize import call, refused, topics
 from toolkit.channels import MATCH, POSE, SCENE_OBJECTS
 from toolkit.landmarks.database import write_map
 from toolkit.landmarks.model import LandmarkMap, Source

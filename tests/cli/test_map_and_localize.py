@@ -6,26 +6,16 @@ import resource
 import shutil
 import sqlite3
 from pathlib import Path
-from typing import Any
 
 import jsonschema
 import numpy as np
 import pytest
 
+from tests.cli.calls import call, refused, schema_of, topics
 from tests.cli.logs import messages, write
 from toolkit.channels import MATCH, ODOMETRY, POSE, SCENE_OBJECTS, TF
-from toolkit.cli.main import run
 from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.recording.reader import open_recording
-from toolkit.resources import resource as resource_path
 from toolkit.stage import Channel, Stamped
-
-
-def call(*words: object) -> int:
-    """Exit code of the command line."""
-    with pytest.raises(SystemExit) as stop:
-        run([str(word) for word in words])
-    return int(stop.value.code or 0)
 
 
 @pytest.fixture(scope="module")
@@ -37,16 +27,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert call("map", here / "a.mcap", "--map", here / "a.db", "-o", here / "mapped.mcap") == 0
     assert call("localize", here / "b.mcap", "--map", here / "a.db", "-o", here / "b_in_a.mcap") == 0
     return here
-
-
-def schema_of(verb: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(resource_path("schemas", f"json/{verb}.schema.json").read_text())
-    return found
-
-
-def topics(path: Path) -> dict[str, int]:
-    with open_recording(path) as recording:
-        return {entry.connection.topic: entry.count for entry in recording.channels}
 
 
 def test_map_writes_database_and_log(folder: Path) -> None:
@@ -117,15 +97,6 @@ def test_a_frame_above_odom_is_left_alone(folder: Path, tmp_path: Path, capsys: 
     assert call("localize", log, "--map", folder / "a.db", "-o", tmp_path / "out.mcap") == 0
     assert topics(tmp_path / "out.mcap")[TF.topic] == 1
     assert "odom has a parent frame already" in capsys.readouterr().err
-
-
-def refused(capsys: pytest.CaptureFixture[str], code: int, *words: object) -> str:
-    """The one line on stderr of a refusal."""
-    capsys.readouterr()
-    assert call(*words) == code
-    lines = capsys.readouterr().err.strip().splitlines()
-    assert len(lines) == 1, lines
-    return lines[0]
 
 
 def without(channel: Channel, content: list[Stamped]) -> list[Stamped]:

@@ -10,11 +10,11 @@ from typing import Any
 import jsonschema
 import pytest
 
+from tests.cli.calls import call
 from tests.cli.logs import write
 from tests.landmarks.maps import small_map
 from tests.runs.chain import COUNT, STEP_NS, counted, raw_log, raw_messages, two_posts
 from toolkit.channels import CAMERA_IMAGE, DETECTIONS, MATCH, SCENE_OBJECTS
-from toolkit.cli.main import run
 from toolkit.landmarks.database import write_map
 from toolkit.messages.codec import Message
 from toolkit.recording.reader import open_recording
@@ -23,13 +23,6 @@ from toolkit.runs import step
 from toolkit.runs.tallies import tally
 
 FRONT = "detect,cluster,fuse"
-
-
-def call(*words: object) -> int:
-    """Exit code of the command line."""
-    with pytest.raises(SystemExit) as stop:
-        run([str(word) for word in words])
-    return int(stop.value.code or 0)
 
 
 @pytest.fixture

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.cli.calls import call, refused
 from tests.cli.logs import write
-from tests.cli.test_map_and_localize import call, refused
 from tests.runs.chain import COUNT, counted, raw_messages, two_posts
 from toolkit.channels import ODOMETRY, SCAN
 from toolkit.messages.points import PointCloud2

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from mcap.writer import Writer as McapWriter
 
+from tests.cli.calls import topics
 from tests.landmarks.maps import small_map
 from tests.runs.chain import COUNT, STEP_NS, counted, raw_log, raw_messages, two_posts
 from toolkit.channels import DETECTIONS, MATCH, ODOMETRY, SCENE_OBJECTS, TF
@@ -46,11 +47,6 @@ def states(run: LogRun) -> dict[str, str]:
 
 def reasons(run: LogRun) -> dict[str, str]:
     return {stage.stage: stage.reason for stage in run.stages}
-
-
-def topics(path: Path) -> dict[str, int]:
-    with open_recording(path) as recording:
-        return {entry.connection.topic: entry.count for entry in recording.channels}
 
 
 def test_a_chain_leaves_all_channels_and_no_parts(here: Path) -> None:
