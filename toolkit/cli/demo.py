@@ -19,7 +19,7 @@ def command(
     """
     from toolkit.cli import evaluate, localize, plot
     from toolkit.cli import map as build
-    from toolkit.cli.groups import ImageOptions, LogOptions, ScanOptions
+    from toolkit.cli.option_groups import ImageOptions, LogOptions, ScanOptions
     from toolkit.resources import resource
     from toolkit.runs.outputs import make_folder
 

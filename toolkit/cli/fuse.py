@@ -7,7 +7,7 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import say, table
-from toolkit.cli.groups import LogOptions
+from toolkit.cli.option_groups import LogOptions
 from toolkit.cli.stage_runs import Given, finish, run_over
 
 if TYPE_CHECKING:

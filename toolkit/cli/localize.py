@@ -8,7 +8,7 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import PARTIAL, moment, progress, say, say_json, table, warn
-from toolkit.cli.groups import ImageOptions, LogOptions, ScanOptions
+from toolkit.cli.option_groups import ImageOptions, LogOptions, ScanOptions
 from toolkit.cli.stage_runs import Given, finish, run_over
 from toolkit.errors import UsageError
 

@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from toolkit.cli.console import run_command
-from toolkit.cli.groups import spread
+from toolkit.cli.option_groups import spread
 from toolkit.errors import UsageError
 
-_NOT_VERBS = {"__init__", "main", "console", "groups", "options", "stage_runs"}
+_NOT_VERBS = {"__init__", "main", "console", "option_groups", "options", "stage_runs"}
 _HELP = "Landmark maps and positions from robot recordings, offline and without ROS."
 
 

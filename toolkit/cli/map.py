@@ -7,7 +7,7 @@ import typer
 
 from toolkit.cli import options
 from toolkit.cli.console import PARTIAL, progress, say, say_json, table
-from toolkit.cli.groups import ImageOptions, LogOptions, ScanOptions
+from toolkit.cli.option_groups import ImageOptions, LogOptions, ScanOptions
 from toolkit.cli.stage_runs import Given, tell, told
 from toolkit.errors import UsageError
 

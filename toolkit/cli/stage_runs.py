@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from toolkit.cli.console import PARTIAL, progress, say_json, warn
-from toolkit.cli.groups import ImageOptions, LogOptions, ScanOptions
+from toolkit.cli.option_groups import ImageOptions, LogOptions, ScanOptions
 from toolkit.cli.options import time_ns
 
 if TYPE_CHECKING:

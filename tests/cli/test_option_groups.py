@@ -9,7 +9,7 @@ import typer
 from typer.testing import CliRunner
 
 from toolkit.cli import options
-from toolkit.cli.groups import LogOptions, ScanOptions, spread
+from toolkit.cli.option_groups import LogOptions, ScanOptions, spread
 from toolkit.errors import UsageError
 
 taken: list[object] = []
