@@ -11,6 +11,7 @@ from toolkit.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RE
 from toolkit.recording.index import Block, Index
 
 RUN_BYTES = 1 << 20
+"""A run of messages outside chunks ends here: each becomes one block, and blocks are read whole."""
 
 
 class _Run:
