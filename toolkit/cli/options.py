@@ -31,7 +31,12 @@ ScanTopics = Annotated[
     list[str] | None, typer.Option("--scan", help="Scan topic, where the log has several; twice for two LiDARs.")
 ]
 ScanFrom = Annotated[
-    str | None, typer.Option("--scan-from", metavar="TOPIC", help="Point cloud to take a slice of as the scan.")
+    str | None,
+    typer.Option(
+        "--scan-from",
+        metavar="TOPIC",
+        help="Point cloud to take a slice of as the scan; de-skewed if its points tell their times.",
+    ),
 ]
 Slice = Annotated[
     str | None,
