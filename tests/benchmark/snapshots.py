@@ -1,6 +1,6 @@
 """Real snapshots (UTIAS MRCLAM, Leung et al. 2011): positions from ranges and bearings against the true ones."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat
 
+from tests.benchmark.peers import betke_gurvits, sayed, total
 from tests.benchmark.rows import Row
 from tests.estimation.worlds import Array
 from toolkit.estimation.calibration import calibrate
@@ -18,6 +19,16 @@ from toolkit.estimation.thesis import solve_position
 COVARIANCE = np.diag([0.12**2, 0.03**2])
 _ROBUST_DOF = 3.0
 _FEW = 300
+
+Solver = Callable[[Array, Array, Array, Array], Array]
+"""Position (2,) from landmarks (K, 2), ranges and bearings (K,) and the middle (2,) of all robots."""
+# The thesis's and ToTal take the first three landmarks; only the thesis's needs a guess.
+_PEERS: dict[str, Solver] = {
+    "thesis": lambda xy, distance, _bearing, guess: solve_position(xy[:3], distance[:3], guess),
+    "sayed": lambda xy, distance, _bearing, _guess: sayed(xy, distance),
+    "total": lambda xy, _distance, bearing, _guess: total(xy[:3], bearing[:3]),
+    "betke_gurvits": lambda xy, _distance, bearing, _guess: betke_gurvits(xy, bearing),
+}
 
 
 class SnapshotSet(NamedTuple):
@@ -52,8 +63,8 @@ def snapshot_rows(data: Path) -> Iterator[Row]:
     sets = [read_snapshots(data / "mrclam" / f"mrclam{number}.mat") for number in (1, 2, 3, 4)]
     ours = np.concatenate([_errors(given, calibrated=True) for given in sets])
     plain = np.concatenate([_errors(given, calibrated=False) for given in sets])
-    thesis = np.concatenate([_thesis_errors(given) for given in sets])
-    others = {"as_converted": plain, "thesis": thesis}
+    others = {"as_converted": plain}
+    others |= {name: np.concatenate([_errors_of(solver, given) for given in sets]) for name, solver in _PEERS.items()}
     cases = len(ours)
 
     def under(limit_m: float) -> dict[str, float]:
@@ -77,9 +88,12 @@ def _errors(given: SnapshotSet, *, calibrated: bool) -> Array:
     return np.asarray(np.linalg.norm(solved.map_from_base[:, :2] - given.poses[:, :2], axis=1))
 
 
-def _thesis_errors(given: SnapshotSet) -> Array:
-    """The thesis's solver on the first three landmarks of some snapshots; its guess is the middle of all robots."""
-    guess = given.poses[:, :2].mean(axis=0)
+def _errors_of(solver: Solver, given: SnapshotSet) -> Array:
+    """Another solver's errors on some snapshots."""
+    middle = given.poses[:, :2].mean(axis=0)
     rows = np.linspace(0, len(given.poses) - 1, _FEW).astype(int)
-    found = [solve_position(given.landmarks_xy[i, :3], given.range_m[i, :3], guess) for i in rows]
+    found = [
+        solver(given.landmarks_xy[i, seen], given.range_m[i, seen], given.bearing_rad[i, seen], middle)
+        for i, seen in zip(rows, given.mask[rows], strict=True)
+    ]
     return np.asarray(np.linalg.norm(np.array(found) - given.poses[rows, :2], axis=1))
