@@ -4,14 +4,16 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tests.stages.worlds import circle, drive, ring
-from toolkit.channels import MAP, MATCH, POSE, POSE_COVARIANCE, TF
+from toolkit.channels import MAP, MATCH, POSE, POSE_COVARIANCE, SCENE_OBJECTS, TF
 from toolkit.landmarks.database import write_map
 from toolkit.landmarks.exchange_thesis import parse_map
 from toolkit.landmarks.model import LandmarkMap, Source
 from toolkit.messages.match import Status
-from toolkit.stage import Stamped
+from toolkit.messages.scene import SceneObjects
+from toolkit.stage import Bundle, Stamped
 from toolkit.stages.localize import LocalizeConfig, process
 
 APPENDIX_C = Path(__file__).resolve().parents[1] / "data" / "thesis_appendix_c.txt"
@@ -104,3 +106,21 @@ def test_the_thesis_method_gives_positions_without_heading(tmp_path: Path) -> No
 def test_the_thesis_method_needs_three_known_objects(tmp_path: Path) -> None:
     found = localized(tmp_path, LocalizeConfig(method="thesis"), unique=True)
     assert set(statuses(found)) <= {Status.TOO_FEW_OBJECTS, Status.NO_MATCH}
+
+
+@pytest.mark.parametrize(
+    "landmarks",
+    [[[10.0, 0.0], [10.6, 0.0]], [[10.0, 0.0], [10.3, 0.02], [10.6, -0.02]]],
+    ids=["two in line with the robot", "three nearly on a line"],
+)
+def test_geometry_too_weak_for_a_position(tmp_path: Path, landmarks: list[list[float]]) -> None:
+    places = np.array(landmarks)
+    names = tuple(f"l{i}" for i in range(len(places)))
+    database = tmp_path / "map.db"
+    write_map(database, LandmarkMap.surveyed(names, names, places, Source("import", "test")))
+    covariances = np.tile(np.diag([0.05**2, 0.1**2]), (len(places), 1, 1))
+    options = tuple(((name, 1.0),) for name in names)
+    seen = SceneObjects(1, "base", names, options, places, covariances, np.zeros(len(places)))
+    found = list(process([Bundle(1, 1, {SCENE_OBJECTS: seen}, None)], LocalizeConfig(), {"map": database}))
+    assert statuses(found) == [Status.WEAK_GEOMETRY]
+    assert not any(stamped.channel in {POSE, POSE_COVARIANCE, TF} for stamped in found)
