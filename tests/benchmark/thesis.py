@@ -21,7 +21,8 @@ from tests.benchmark.thesis_runs import (
     call,
     drawing_of,
     groups_mapped,
-    record,
+    record_localize,
+    record_map,
     stops_of,
 )
 from tests.benchmark.thesis_study import study_rows
@@ -68,8 +69,8 @@ def measure(
 
 def _one_seed(folder: Path, seed: int, model: list[str], runs: dict[str, Runs], figures: Path | None) -> None:
     """Record both drives, map one and localize the other with each method, without and with drift."""
-    mapped, mapped_drift = record(folder, "map", seed, model)
-    asked, asked_drift = record(folder, "localize", seed + _APART, model)  # else its noise would be the map's
+    mapped, mapped_drift = record_map(folder, seed, model)
+    asked, asked_drift = record_localize(folder, seed + _APART, model)  # else its noise would be the map's
     stops = stops_of(asked)
     if len(stops) != STOPS:
         raise RuntimeError(f"seed {seed}: {len(stops)} stops instead of {STOPS}")

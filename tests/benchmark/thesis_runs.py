@@ -79,24 +79,38 @@ def call(verb: str, *words: object) -> dict[str, Any]:
     return document
 
 
-def record(folder: Path, name: str, seed: int, model: list[str]) -> tuple[Path, Path]:
-    """The drive `thesis_NAME` of a seed with detections, once with perfect and once with drifting odometry.
+def record_map(folder: Path, seed: int, model: list[str]) -> tuple[Path, Path]:
+    """The drive `thesis_map`, with scans at its stops only as in the thesis, and `thesis_map_drift` with all scans."""
+    seen = record(folder, "thesis_map", seed, model)
+    target = folder / "map.mcap"
+    cut(seen, seen, stops_of(seen), target)
+    seen.unlink()
+    return target, record(folder, "thesis_map_drift", seed, model)
 
-    Both are one drive with the same images and scans, since a seed's draws do not depend on each other. With perfect
-    odometry the LiDAR looks at the stops only, as in the thesis; with drift its tracks must hold the map together.
+
+def record_localize(folder: Path, seed: int, model: list[str]) -> tuple[Path, Path]:
+    """The drive `thesis_localize` with perfect odometry and scans at its stops only, and with drift and all scans.
+
+    Both have the same images and scans, since a seed's draws do not depend on each other.
     """
-    raw, drifting, seen = folder / f"{name}_raw.mcap", folder / f"{name}_odometry.mcap", folder / f"{name}_seen.mcap"
-    common = ("--seed", seed, "--workers", 1)
-    call("generate", f"thesis_{name}", "-o", raw, *common, "--set", f"camera.rate_hz={IMAGES_HZ}")
-    call("generate", f"thesis_{name}_drift", "-o", drifting, *common, "--set", "camera.when=never")
-    call("detect", raw, "-o", seen, *model)
-    stops = stops_of(seen)
-    perfect, with_drift = folder / f"{name}.mcap", folder / f"{name}_drift.mcap"
-    cut(seen, seen, stops, perfect)
+    seen, drifting = record(folder, "thesis_localize", seed, model), folder / "odometry.mcap"
+    call("generate", "thesis_localize_drift", "-o", drifting, "--seed", seed, "--workers", 1, "--set=camera.when=never")
+    perfect, with_drift = folder / "localize.mcap", folder / "localize_drift.mcap"
+    cut(seen, seen, stops_of(seen), perfect)
     cut(seen, drifting, None, with_drift)
-    for path in (raw, drifting, seen):
-        path.unlink()
+    seen.unlink()
+    drifting.unlink()
     return perfect, with_drift
+
+
+def record(folder: Path, scenario: str, seed: int, model: list[str]) -> Path:
+    """The drive of a scenario with what the detector finds in its images."""
+    raw, seen = folder / f"{scenario}_raw.mcap", folder / f"{scenario}.mcap"
+    images = ("--set", f"camera.rate_hz={IMAGES_HZ}")
+    call("generate", scenario, "-o", raw, "--seed", seed, "--workers", 1, *images)
+    call("detect", raw, "-o", seen, *model)
+    raw.unlink()
+    return seen
 
 
 def cut(log: Path, drive: Path, stops: Stops | None, target: Path) -> None:
