@@ -4,8 +4,11 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
 from functools import partial
+from itertools import repeat
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -32,78 +35,91 @@ from toolkit.report.drawing import Drawing, gather
 from toolkit.report.plots import figure, save
 
 FIRST_SEED, SEEDS = 10_000, 10
-_APART = 5_000
+_APART = 5_000  # of the seed to map and the one to localize, else their noise would be the same
+_AT_ONCE = 2
 METHODS = {"default": [], "thesis": THESIS}
 BETKE_GURVITS, EBIED = "Betke and Gurvits, 200 positions", "Ebied and Abdel-Wahab, 143 positions"
 
 
-@dataclass(slots=True)
-class Runs:
-    """What one method gave over the seeds: groups mapped and positions, without and with drift.
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What one method gave on one seed: groups mapped and positions, without and with drift.
 
     `alone` are positions without drift that use nothing but one bundle each.
     """
 
-    groups: list[int] = field(default_factory=list)
-    groups_drift: list[int] = field(default_factory=list)
-    perfect: list[Positions] = field(default_factory=list)
-    alone: list[Positions] = field(default_factory=list)
-    drift: list[Positions] = field(default_factory=list)
+    groups: int
+    groups_drift: int
+    perfect: Positions
+    alone: Positions
+    drift: Positions
 
 
 def measure(
     quick: bool, first_seed: int = FIRST_SEED, model: Path | None = None, figures: Path | None = None
 ) -> Iterator[Row]:
     """The experiment's rows, then those of the study of section 5.2."""
-    runs = {method: Runs() for method in METHODS}
     seeds = range(first_seed, first_seed + (1 if quick else SEEDS))
-    for seed in seeds:
-        with tempfile.TemporaryDirectory() as folder:
-            words = ["--model", str(model)] if model else []
-            _one_seed(Path(folder), seed, words, runs, figures if seed == first_seed else None)
+    words = ["--model", str(model)] if model else []
+    folders = [figures if seed == first_seed else None for seed in seeds]
+    with ProcessPoolExecutor(_AT_ONCE, get_context("spawn")) as pool:
+        found = list(pool.map(_one_seed, seeds, repeat(words), folders))
+    runs = {method: [outcome[method] for outcome in found] for method in METHODS}
     if figures is not None:
         _draw(figures, runs)
     yield from _rows(runs, len(seeds))
     yield from study_rows(first_seed, quick)
 
 
-def _one_seed(folder: Path, seed: int, model: list[str], runs: dict[str, Runs], figures: Path | None) -> None:
-    """Record both drives, map one and localize the other with each method, without and with drift."""
-    mapped, mapped_drift = record_map(folder, seed, model)
-    asked, asked_drift = record_localize(folder, seed + _APART, model)  # else its noise would be the map's
-    stops = stops_of(asked)
-    if len(stops) != STOPS:
-        raise RuntimeError(f"seed {seed}: {len(stops)} stops instead of {STOPS}")
+def _one_seed(seed: int, model: list[str], figures: Path | None) -> dict[str, Outcome]:
+    """Record all drives, map and localize with each method, without and with drift."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        maps, asked = record_map(folder, seed, model), record_localize(folder, seed + _APART, model)
+        stops = stops_of(asked[0])
+        if len(stops) != STOPS:
+            raise RuntimeError(f"seed {seed}: {len(stops)} stops instead of {STOPS}")
+        return {method: _outcome(method, folder, maps, asked, model, figures) for method in METHODS}
+
+
+def _outcome(
+    method: str, folder: Path, maps: tuple[Path, Path], asked: tuple[Path, Path], model: list[str], figures: Path | None
+) -> Outcome:
+    """One method on the logs to map and those to localize, each without and with drift."""
     database, built, result, alone = (folder / name for name in ("map.db", "built.mcap", "result.mcap", "alone.mcap"))
-    for method, words in METHODS.items():
-        own, given = runs[method], [*words, *model]
-        call("map", mapped, "--map", database, "-o", built, *given, *(PERFECT if method == "default" else []))
-        own.groups.append(groups_mapped(database, mapped, aligned=False))
-        if figures is not None:
-            _save(partial(figure, gather([database, built], aligned=False)[0], "Figure 5.2"), figures, "5_2", method)
-        call("localize", asked, "--map", database, "-o", result, *given)
-        own.perfect.append(at_stops(result, stops, aligned=False))
-        if method == "default":  # each bundle without what came before it; the thesis knows no other way
-            call("localize", result, "--map", database, "-o", alone, *given, "--set", "localize.join_m=0")
-        own.alone.append(at_stops(alone if method == "default" else result, stops, aligned=False))
-        call("map", mapped_drift, "--map", database, *given)
-        own.groups_drift.append(groups_mapped(database, mapped, aligned=True))
-        call("localize", asked_drift, "--map", database, "-o", result, *given)
-        own.drift.append(at_stops(result, stops, aligned=True))
+    given, stops = [*METHODS[method], *model], stops_of(asked[0])
+    call("map", maps[0], "--map", database, "-o", built, *given, *(PERFECT if method == "default" else []))
+    groups = groups_mapped(database, maps[0], aligned=False)
+    if figures is not None:
+        _save(partial(figure, gather([database, built], aligned=False)[0], "Figure 5.2"), figures, "5_2", method)
+    call("localize", asked[0], "--map", database, "-o", result, *given)
+    perfect = by_itself = at_stops(result, stops, aligned=False)
+    if method == "default":  # each bundle without what came before it; the thesis knows no other way
+        call("localize", result, "--map", database, "-o", alone, *given, "--set", "localize.join_m=0")
+        by_itself = at_stops(alone, stops, aligned=False)
+    call("map", maps[1], "--map", database, *given)
+    groups_drift = groups_mapped(database, maps[0], aligned=True)
+    call("localize", asked[1], "--map", database, "-o", result, *given)
+    return Outcome(groups, groups_drift, perfect, by_itself, at_stops(result, stops, aligned=True))
 
 
-def _rows(runs: dict[str, Runs], seeds: int) -> Iterator[Row]:
+def _rows(runs: dict[str, list[Outcome]], seeds: int) -> Iterator[Row]:
     ours, theirs = runs["default"], runs["thesis"]
-    perfect, alone, drift = (Positions.pooled(found) for found in (ours.perfect, ours.alone, ours.drift))
-    thesis, thesis_drift = Positions.pooled(theirs.perfect), Positions.pooled(theirs.drift)
+    perfect, alone, drift = (
+        Positions.pooled([getattr(run, name) for run in ours]) for name in ("perfect", "alone", "drift")
+    )
+    thesis, thesis_drift = (Positions.pooled([getattr(run, name) for run in theirs]) for name in ("perfect", "drift"))
     cases = seeds * STOPS
     yield Row(
         "groups_mapped",
-        float(np.mean(ours.groups)),
+        float(np.mean([run.groups for run in ours])),
         "of 20",
         at_least=19.5,
         cases=seeds,
-        peers={"thesis": float(np.mean(theirs.groups)), "with drift": float(np.mean(ours.groups_drift))},
+        peers={
+            "thesis": float(np.mean([run.groups for run in theirs])),
+            "with drift": float(np.mean([run.groups_drift for run in ours])),
+        },
     )
     yield Row(
         "positions_computed",
@@ -187,8 +203,10 @@ def _errors(found: np.ndarray, truth: np.ndarray) -> np.ndarray:
     return pose_errors(np.hstack([found[rows], unknown]), np.hstack([truth[rows], unknown]))
 
 
-def _draw(folder: Path, runs: dict[str, Runs]) -> None:
-    drawings = {method: drawing_of(method, Positions.pooled(own.alone)) for method, own in runs.items()}
+def _draw(folder: Path, runs: dict[str, list[Outcome]]) -> None:
+    drawings = {
+        method: drawing_of(method, Positions.pooled([run.alone for run in own])) for method, own in runs.items()
+    }
     for method, drawing in drawings.items():
         if len(drawing.runs[0].scored.rows):
             _save(partial(positions_figure, drawing, "Figure 5.3"), folder, "5_3", method)
@@ -197,7 +215,7 @@ def _draw(folder: Path, runs: dict[str, Runs]) -> None:
 
 
 def _save(draw: Callable[[], Figure], folder: Path, number: str, method: str) -> None:
-    folder.mkdir(exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     with (folder / f"figure_{number}_{method}.png").open("wb") as stream:
         save(draw, stream, "png")
 
