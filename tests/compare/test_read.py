@@ -10,7 +10,7 @@ import pytest
 
 from tests.compare.recordings import START_NS, STEP_NS, localized_log, localized_messages, write
 from tests.landmarks.maps import small_map
-from toolkit.channels import MAP_POSE, MATCH, SCENE_OBJECTS, TRUTH_POSE
+from toolkit.channels import MAP_POSE, MATCH, POSE, SCENE_OBJECTS, TRUTH_POSE
 from toolkit.compare.metrics import evaluate, score
 from toolkit.compare.read import read_reference, read_run
 from toolkit.compare.results import results_of
@@ -48,6 +48,18 @@ def test_a_localized_log(tmp_path: Path) -> None:
     assert found["nees"] == pytest.approx((1 + 0 + 1) / 3 / 3)
     assert found["map"]["matched"] == 3
     assert found["map"]["rmse_m"] == pytest.approx(0)
+
+
+def test_a_position_without_heading_is_not_judged_by_one(tmp_path: Path) -> None:
+    messages = [
+        (channel, time_ns, replace(message, orientation_xyzw=np.zeros(4)) if channel == POSE else message)
+        for channel, time_ns, message in localized_messages()
+    ]
+    assert sum(channel == POSE for channel, *_ in messages) == 3
+    write(tmp_path / "r.mcap", messages)
+    found = evaluated(tmp_path / "r.mcap")
+    assert found["position"]["median_m"] == pytest.approx(0.1)
+    assert found["heading"] == {"rmse_deg": None, "median_deg": None}
 
 
 def test_a_mapped_log_is_judged_by_its_trajectory(tmp_path: Path) -> None:

@@ -99,6 +99,8 @@ class Collected:
         bad = ~np.isfinite(poses).all(axis=1)
         if bad.any():
             raise RecordingError(f"{self.name}: {topic} at {times[bad][0]} is not finite; repair or cut the log")
+        if topic == POSE.topic:
+            poses[~orientation.any(axis=1), 2] = np.nan  # a position without heading
         self.poses.setdefault(topic, []).append((times, poses))
 
     def _matches(self, topic: str, times: Indices, table: Table) -> None:
