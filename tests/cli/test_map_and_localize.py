@@ -188,3 +188,9 @@ def test_a_full_disk_leaves_nothing(folder: Path, tmp_path: Path, capsys: pytest
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert "free space or choose another place" in line
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_is_mapped_once(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for again in (folder / "a.mcap", folder / "mapped.mcap"):
+        line = refused(capsys, 2, "map", folder / "a.mcap", again, "--map", tmp_path / "twice.db")
+        assert f"{again} is the same recording as {folder / 'a.mcap'}; name it once" in line

@@ -10,7 +10,7 @@ from typing import Any
 
 from toolkit.atomic import check_target
 from toolkit.channels import MAP_MARKERS, MAP_PATH, MAP_POSE
-from toolkit.errors import MapError, RecordingError
+from toolkit.errors import MapError, RecordingError, UsageError
 from toolkit.landmarks.database import read_manifest, read_map, write_map
 from toolkit.landmarks.markers import markers_from_map
 from toolkit.landmarks.model import LandmarkMap, Source
@@ -107,6 +107,7 @@ def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
             _plan_log(f"log {number}", stage, config, request, task, parts)
             for number, request in enumerate(task.requests, 1)
         ]
+        _check_each_once(plans)
         inputs = {entry.place: entry.record.key for entry in plans}
         record = record_of(stage, config, task.files, inputs, {})
         run = None if task.requests[0].force else _found(task, plans, record, parts)
@@ -133,6 +134,16 @@ def _plan_log(place: str, stage: Reduction, config: Any, request: Request, task:
         options = choice_options(request.span.choice, stage.reads)
         record = record_of(stage, config, task.files, inputs_of_stage(stage, bench.log, steps), options)
         return _LogPlan(place, request, bench.log.recording.fingerprint(), steps, record)
+
+
+def _check_each_once(plans: Sequence[_LogPlan]) -> None:
+    """Refuse a recording that is named twice, also as an output of ours: what it saw would count double."""
+    known: dict[str, Path] = {}
+    for entry in plans:
+        path = entry.request.recording
+        if entry.fingerprint in known:
+            raise UsageError(f"{path} is the same recording as {known[entry.fingerprint]}; name it once")
+        known[entry.fingerprint] = path
 
 
 def _share(entry: _LogPlan, record: StageRecord) -> StageRecord:
