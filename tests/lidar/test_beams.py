@@ -14,7 +14,7 @@ UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 def hits(beams: Beams) -> Array:
-    points = beams.points_xy[np.isfinite(beams.ranges_m)]
+    points = beams.points_at(np.flatnonzero(np.isfinite(beams.ranges_m)))
     return points[np.lexsort(points.T)]
 
 

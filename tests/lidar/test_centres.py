@@ -137,7 +137,7 @@ def test_profiles(shape: Shape, heading: float, offset: float, depth: float) -> 
     shown = profile(shape)
     _, turns, offsets = shown.depths_m.shape
     column = round(offset / shown.step_m) + offsets // 2
-    row = round(heading / (2 * np.pi) * turns) % turns
+    row = round(heading / shape.turn_rad * turns) % turns if shape.turn_rad else 0
     np.testing.assert_allclose(shown.depths_m[0, row, column], depth, atol=0.006)
 
 

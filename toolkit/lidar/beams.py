@@ -31,11 +31,10 @@ class Beams:
     spacing_rad: tuple[float, ...]
     is_closed: tuple[bool, ...]
 
-    @property
-    def points_xy(self) -> Array:
-        """Where the beams ended (N, 2); not finite where they met nothing."""
+    def points_at(self, beams: NDArray[np.int64]) -> Array:
+        """Where some beams (N,) ended (N, 2); not finite where they met nothing."""
         with np.errstate(invalid="ignore"):
-            points: Array = self.origins_xy + self.ranges_m[:, None] * self.directions_xy
+            points: Array = self.origins_xy[beams] + self.ranges_m[beams, None] * self.directions_xy[beams]
         return points
 
 

@@ -1,6 +1,7 @@
 """Cells of the space of positions across the view, turns and sizes of a shape, and what a scan says of each."""
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -82,15 +83,16 @@ def first_cells(lateral_m: Array, shapes: Palette) -> Cells:
     return Cells(*(part.astype(np.float32) for part in parts))
 
 
+@cache
 def _grid(across: int, turns: int, sizes: int) -> Array:
     """The middles (3, K) of cells of a unit cube."""
     axes = [(np.arange(count) + 0.5) / count for count in (across, turns, sizes)]
     return np.stack(np.meshgrid(*axes, indexing="ij")).reshape(3, -1)
 
 
-def finer(cells: Cells, rows: NDArray[np.intp], log_weights: Array) -> Cells:
-    """The best cells of some rows, each cut up: into four across and by turn, into two by size."""
-    best = np.argpartition(-log_weights[rows], _KEPT - 1, axis=1)[:, :_KEPT]
+def finer(cells: Cells, rows: NDArray[np.intp], shares: Array) -> Cells:
+    """The cells of some rows that have the largest shares (R, K), cut up: into four across and by turn, two by size."""
+    best = np.argpartition(shares[rows], -_KEPT, axis=1)[:, -_KEPT:]
     turns, sizes = 4 if cells.half_turn_rad[0] > 0 else 1, 2 if cells.half_size[0] < 0.5 else 1
     x, t, s = (2 * _grid(4, turns, sizes) - 1).astype(np.float32)
 
@@ -156,7 +158,7 @@ def _cast(rays: Rays, cells: Cells, shapes: Palette) -> Floats:
     offset = rays.ahead * y
     offset -= rays.left * x
     offset += rays.offset_m
-    predicted = shapes.look_up(rays.row, rays.headings_rad - cells.turn_rad[rays.row], offset, cells.size)
+    predicted = shapes.look_up((rays.row, rays.headings_rad, offset), cells.turn_rad, cells.size)
     x *= rays.ahead
     y *= rays.left
     predicted += x

@@ -14,11 +14,13 @@ from toolkit.lidar.windows import Windows
 
 _ENOUGH, _MANY = 5.0, 12.0
 """A posterior that spreads over so many cells of the grid is fine enough, over many even where these are coarse."""
-_BLURRED = 8.0
+_BLURRED = 4.0
 """A grid is too coarse where its cells add so much more to the variance of a hit."""
 _LEVELS = 3
 _HOPELESS = 12.0
 """A shape whose evidence is lower than another's by this logarithm needs no better place."""
+_LOST = 1 / 3
+"""So many times as many beams as meet a thing, at most, return nothing from it."""
 _EDGE_M = 0.03
 """How much wider than its shape noise can make an object look."""
 
@@ -62,15 +64,27 @@ def centres(
 
 
 def _possible(window: Windows, shapes: Palette) -> NDArray[np.bool_]:
-    """Whether clusters (C, S) are no wider than the shapes, and no narrower where beams pass them on both sides."""
+    """Whether clusters (C, S) are no wider than the shapes, and no narrower where beams pass them on both sides.
+
+    Nor may many beams pass between the hits, if the shapes have no holes.
+    """
     width = (window.lateral_m[:, 1] - window.lateral_m[:, 0])[:, None]
+    behind = (window.ranges_m - window.abreast_m)[:, None] > shapes.reach_m
     beside = (window.beside_m > 0) & (window.beside_m <= 1.5 * window.spacing_m[window.cluster])
-    behind = (window.ranges_m - window.abreast_m)[beside]
-    passed = np.zeros((len(window), len(shapes.reach_m)), dtype=np.int64)
-    np.add.at(passed, window.cluster[beside], behind[:, None] > shapes.reach_m)
+    between = (window.beside_m == 0) & ~window.is_hit
+    passed, holes = (_counts(window.cluster[rows], behind[rows], len(window)) for rows in (beside, between))
     least = shapes.least_width_m - 3 * window.spacing_m[:, None] - _EDGE_M / 2
-    possible: NDArray[np.bool_] = (width <= 2 * shapes.reach_m + _EDGE_M) & ((width >= least) | (passed < 2))
+    fits = (width >= least) | (passed < 2)
+    fits &= (shapes.least_width_m == 0) | (holes <= _LOST * (window.hits[:, None] + 3))
+    possible: NDArray[np.bool_] = (width <= 2 * shapes.reach_m + _EDGE_M) & fits
     return possible
+
+
+def _counts(rows: NDArray[np.intp], values: NDArray[np.bool_], many: int) -> NDArray[np.int64]:
+    """How many values (N, S) are true in each of so many rows."""
+    counts = np.zeros((many, values.shape[1]), dtype=np.int64)
+    np.add.at(counts, rows, values)
+    return counts
 
 
 class _Search:
@@ -93,54 +107,38 @@ class _Search:
 
     def refine(self, least: Array) -> None:
         """Refine the grids of rows that could get their cluster's evidence of `least` (C,)."""
-        blur = np.log1p(self._cells.blur_m2(self._shapes) / sharp(self._noise))
-        known = self._found.log_evidence[self._clusters, self._which]
-        hopeful = known + 0.5 * self._window.hits[self._clusters] * blur >= least[self._clusters]
         for _ in range(_LEVELS):
-            cells = 1 / (_shares(self._log_weights) ** 2).sum(axis=1)
-            blurred = self._cells.blur_m2(self._shapes) > _BLURRED * sharp(self._noise)
-            again = np.flatnonzero(hopeful & (cells < np.where(blurred, _MANY, _ENOUGH)))
+            blur = self._cells.blur_m2(self._shapes) / sharp(self._noise)
+            known = self._found.log_evidence[self._clusters, self._which]
+            hopeful = known + 0.5 * self._window.hits[self._clusters] * np.log1p(blur) >= least[self._clusters]
+            cells = 1 / (self._share**2).sum(axis=1)
+            again = np.flatnonzero(hopeful & (cells < np.where(blur > _BLURRED, _MANY, _ENOUGH)))
             if not len(again):
                 return
             self._clusters, self._which = self._clusters[again], self._which[again]
             self._shapes = self._shapes.rows(again)
-            self._cells = finer(self._cells, again, self._log_weights)
+            self._cells = finer(self._cells, again, self._share)
             self._weigh(passes=1)
-            hopeful = np.ones(len(again), dtype=np.bool_)
 
     def _weigh(self, passes: int) -> None:
-        rays = self._window.rays(self._clusters, 2 * self._shapes.reach_m)
-        self._cells, self._log_weights, hits = weigh(rays, self._cells, self._shapes, self._noise, passes)
-        rows = self._clusters, self._which
-        _keep(
-            self._found,
-            rows,
-            self._window,
-            self._cells,
-            self._log_weights,
-            sharp(self._noise) / hits.astype(np.float64),
-        )
+        """Weigh the cells, and write what follows for the rows."""
+        window, rows = self._window, (self._clusters, self._which)
+        rays = window.rays(self._clusters, 2 * self._shapes.reach_m)
+        self._cells, log_weights, hits = weigh(rays, self._cells, self._shapes, self._noise, passes)
+        top = log_weights.max(axis=1, keepdims=True)
+        weight = np.exp(log_weights - top)
+        total = weight.sum(axis=1, keepdims=True)
+        self._share = weight / total
+        mean, spread = _moments(self._cells, self._share, sharp(self._noise) / hits.astype(np.float64))
+        turned = rotation(window.bearings_rad[self._clusters])
+        self._found.positions_xy[rows] = window.in_base(self._clusters, mean)
+        self._found.covariances[rows] = turned @ spread @ np.swapaxes(turned, 1, 2)
+        self._found.log_evidence[rows] = (top + np.log(total))[:, 0]
 
 
-def _shares(log_weights: Array) -> Array:
-    weight = np.exp(log_weights - log_weights.max(axis=1, keepdims=True))
-    share: Array = weight / weight.sum(axis=1, keepdims=True)
-    return share
-
-
-def _keep(
-    found: Centres,
-    rows: tuple[NDArray[np.intp], NDArray[np.intp]],
-    window: Windows,
-    cells: Cells,
-    log_weights: Array,
-    variance: Array,
-) -> None:
-    """Write the evidence and the moments of the centre; `variance` (R, K) is that of the cells' distances."""
-    top = log_weights.max(axis=1)
-    weight = np.exp(log_weights - top[:, None])
-    total = weight.sum(axis=1)
-    share = weight / total[:, None]
+def _moments(cells: Cells, share: Array, variance: Array) -> tuple[Array, Array]:
+    """Mean (R, 2) and covariance (R, 2, 2) of the centre, in the windows' frames; `variance` (R, K) is that of the
+    cells' distances."""
     away, across = cells.away_m.astype(np.float64), cells.across_m.astype(np.float64)
     mean = np.stack([(share * away).sum(axis=1), (share * across).sum(axis=1)], axis=1)
     away, across = away - mean[:, :1], across - mean[:, 1:]
@@ -148,7 +146,4 @@ def _keep(
     spread[:, 0, 0] = (share * (away**2 + variance)).sum(axis=1) + SURFACE_M**2
     spread[:, 1, 1] = (share * across**2).sum(axis=1) + np.square(cells.half_across_m) / 3 + SURFACE_M**2
     spread[:, 0, 1] = spread[:, 1, 0] = (share * away * across).sum(axis=1)
-    turned = rotation(window.bearings_rad[rows[0]])
-    found.positions_xy[rows] = window.in_base(rows[0], mean)
-    found.covariances[rows] = turned @ spread @ np.swapaxes(turned, 1, 2)
-    found.log_evidence[rows] = top + np.log(total)
+    return mean, spread

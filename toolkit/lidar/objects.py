@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,8 @@ from toolkit.geometry.se2 import Array, rotation
 from toolkit.lidar.beams import Beams
 from toolkit.lidar.cells import Noise
 from toolkit.lidar.centres import centres
-from toolkit.lidar.segments import Cluster, extent_m, gap_m, points_of
+from toolkit.lidar.palette import palette
+from toolkit.lidar.segments import Cluster, extent_m, gap_m, hits_of, points_of
 from toolkit.lidar.shapes import Shape
 from toolkit.lidar.windows import windows
 
@@ -44,15 +46,17 @@ class Hypotheses:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Explained:
-    """A cluster under H hypotheses, the last one the bare surface: log_evidence (H,), positions (H, 2), (H, 2, 2).
+    """A cluster under H shapes: log_evidence (H + 1,), the last one for none of them, positions (H, 2), (H, 2, 2).
 
     `total` is the logarithm of the evidence for one object here; of two that are joined, for one of known shape.
+    `spacing_m`: the distance of neighbouring beams there.
     """
 
     log_evidence: Array
     positions_xy: Array
     covariances: Array
     total: float
+    spacing_m: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,7 +82,7 @@ def objects(
     explain = _Explainer(beams, kinds, _priors(shapes), noise)
     joined = _joined(beams, clusters, explain)
     return [
-        _ranked([name for name, _ in kinds], explained, beams, cluster)
+        _ranked([name for name, _ in kinds], explained, beams, cluster, noise)
         for cluster, explained in zip(joined, explain(joined), strict=True)
     ]
 
@@ -89,6 +93,7 @@ def _priors(shapes: Mapping[str, Sequence[Shape]]) -> Array:
     return np.array([*share, _NONE if classes else 1.0])
 
 
+@cache
 def _parts_m(shape: Shape) -> tuple[float, float]:
     """The distance of neighbouring parts of the shape, at most, and the radius of the largest; 0 for a single part."""
     if shape.apart_m is not None:
@@ -109,12 +114,13 @@ class _Explainer:
     def __init__(self, beams: Beams, kinds: Sequence[tuple[str, Shape]], priors: Array, noise: Noise) -> None:
         self._beams, self._noise = beams, noise
         self._shapes = list(dict.fromkeys(shape for _, shape in kinds))
-        self._row = [self._shapes.index(shape) for _, shape in kinds]
+        self._row = np.array([self._shapes.index(shape) for _, shape in kinds], dtype=np.intp)
         self._log_priors = np.log(priors)
-        self._across_m = np.array([2 * shape.reach_m for shape in self._shapes])
+        reach_m = palette(self._shapes).reach_m
+        self._across_m = 2 * reach_m
         self._parts_m = np.array([_parts_m(shape) for shape in self._shapes]).reshape(-1, 2)
         # Where a shape does not fit, its centre is still about there.
-        self._vague_m2 = np.array([(0.1 * shape.reach_m + 0.02) ** 2 for _, shape in kinds])
+        self._vague_m2 = (0.1 * reach_m[self._row] + 0.02) ** 2
         self._known: dict[Cluster, _Explained] = {}
 
     @property
@@ -146,45 +152,41 @@ class _Explainer:
 
     def _explain(self, clusters: Sequence[Cluster], allowed: NDArray[np.bool_]) -> None:
         window = windows(self._beams, clusters)
-        found, hits = centres(window, self._shapes, self._noise, allowed), window.hits
+        found = centres(window, self._shapes, self._noise, allowed)
+        nothing = (np.log(window.spacing_m) - (window.hits - 1) * np.log(_UNKNOWN_M))[:, None]
+        shaped = found.log_evidence[:, self._row] + np.log(1 - _OTHER)
+        other = np.where(np.isfinite(shaped), np.log(_OTHER) + nothing, -np.inf)
+        either = np.logaddexp(shaped, other)
+        vague = np.exp(other - np.where(np.isfinite(either), either, 0.0)) * self._vague_m2
+        evidence = np.hstack([either, nothing]) + self._log_priors
+        of_any: Array = np.logaddexp.reduce(evidence, axis=1)
+        of_shapes: Array = np.logaddexp.reduce(shaped + self._log_priors[:-1], axis=1, initial=-np.inf)
+        total = np.where(allowed.all(axis=1), of_any, of_shapes) + _LOG_PER_M2
+        positions = found.positions_xy[:, self._row]
+        covariances = found.covariances[:, self._row] + vague[..., None, None] * np.eye(2)
         for i, cluster in enumerate(clusters):
-            point, spread = _surface(self._beams, cluster, float(window.spacing_m[i]), self._noise)
-            nothing = np.log(window.spacing_m[i]) - (hits[i] - 1) * np.log(_UNKNOWN_M)
-            shaped = found.log_evidence[i, self._row] + np.log(1 - _OTHER)
-            other = np.where(np.isfinite(shaped), np.log(_OTHER) + nothing, -np.inf)
-            either = np.logaddexp(shaped, other)
-            vague = np.exp(other - np.where(np.isfinite(either), either, 0.0)) * self._vague_m2
-            evidence = np.append(either, nothing) + self._log_priors
             self._known[cluster] = _Explained(
-                evidence,
-                np.vstack([found.positions_xy[i, self._row], point]),
-                np.concatenate([found.covariances[i, self._row] + vague[:, None, None] * np.eye(2), spread[None]]),
-                _log_sum(evidence if allowed[i].all() else shaped + self._log_priors[:-1]) + _LOG_PER_M2,
+                evidence[i], positions[i], covariances[i], float(total[i]), float(window.spacing_m[i])
             )
-
-
-def _log_sum(logarithms: Array) -> float:
-    top = float(logarithms.max(initial=-np.inf))
-    return top if np.isinf(top) else top + float(np.log(np.exp(logarithms - top).sum()))
 
 
 def _is_one_view(first: Cluster, second: Cluster) -> bool:
     return bool({one.sweep for one in first} & {one.sweep for one in second})
 
 
-def _surface(beams: Beams, cluster: Cluster, spacing_m: float, noise: Noise) -> tuple[Array, Array]:
-    """The point in the middle of what a scan sees of a cluster, and its covariance."""
-    hits = np.concatenate([segment.hits(beams) for segment in cluster])
-    points = beams.points_xy[hits]
-    away = points.mean(axis=0) - beams.origins_xy[hits].mean(axis=0)
+def _surface(beams: Beams, hits: NDArray[np.int64], spacing_m: float, noise: Noise) -> tuple[Array, Array]:
+    """The point in the middle of what a scan sees of an object by its hits (N,), and its covariance."""
+    points = beams.points_at(hits)
+    mean = points.mean(axis=0)
+    away = mean - beams.origins_xy[hits].mean(axis=0)
     frame = rotation(np.arctan2(away[1], away[0]))
-    local = (points - points.mean(axis=0)) @ frame
-    middle = (local[:, 1].min() + local[:, 1].max()) / 2
-    near = np.argsort(np.abs(local[:, 1] - middle), kind="stable")[:3]
-    depth = local[near, 0]
-    across = (np.ptp(local[:, 1]) + spacing_m) ** 2 / 12
-    spread = frame @ np.diag([noise.sigma_m**2 + depth.var(), across + noise.sigma_m**2]) @ frame.T
-    return points.mean(axis=0) + frame @ np.array([depth.mean(), middle]), spread
+    ahead, left = ((points - mean) @ frame).T
+    first, last = left.min(), left.max()
+    middle = (first + last) / 2
+    near = np.argsort(np.abs(left - middle), kind="stable")[:3]
+    across = (last - first + spacing_m) ** 2 / 12
+    spread = frame @ np.diag([noise.sigma_m**2 + ahead[near].var(), across + noise.sigma_m**2]) @ frame.T
+    return mean + frame @ np.array([ahead[near].mean(), middle]), spread
 
 
 def _joined(beams: Beams, given: Sequence[Cluster], explain: _Explainer) -> list[Cluster]:
@@ -227,15 +229,17 @@ def _pairs(clusters: Sequence[Cluster], points: Mapping[Cluster, Array], explain
     return found
 
 
-def _ranked(names: Sequence[str], explained: _Explained, beams: Beams, cluster: Cluster) -> Hypotheses:
+def _ranked(names: Sequence[str], explained: _Explained, beams: Beams, cluster: Cluster, noise: Noise) -> Hypotheses:
+    hits = hits_of(beams, cluster)
+    point, spread = _surface(beams, hits, explained.spacing_m, noise)
     share = np.exp(explained.log_evidence - explained.log_evidence.max())
     share /= share.sum()
     possible = np.flatnonzero(np.isfinite(explained.log_evidence[:-1]))
-    order = [*possible[np.argsort(-share[possible], kind="stable")].tolist(), len(names)]
+    order = possible[np.argsort(-share[possible], kind="stable")]
     return Hypotheses(
-        tuple([*names, ""][i] for i in order),
-        share[order],
-        explained.positions_xy[order],
-        explained.covariances[order],
-        extent_m(points_of(beams, cluster)),
+        (*(names[i] for i in order), ""),
+        np.append(share[order], share[-1]),
+        np.vstack([explained.positions_xy[order], point]),
+        np.concatenate([explained.covariances[order], spread[None]]),
+        extent_m(beams.points_at(hits)),
     )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from toolkit.geometry.se2 import Array
-from toolkit.lidar.shapes import Shape, profile
+from toolkit.lidar.shapes import OFFSETS, Shape, profile
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
@@ -30,7 +30,6 @@ class Palette:
     starts: Ints
     sizes: Ints
     turns: Ints
-    offsets: Ints
     steps_m: Floats
     reach_m: Array
     turn_rad: Array
@@ -44,7 +43,6 @@ class Palette:
             starts=self.starts[which],
             sizes=self.sizes[which],
             turns=self.turns[which],
-            offsets=self.offsets[which],
             steps_m=self.steps_m[which],
             reach_m=self.reach_m[which],
             turn_rad=self.turn_rad[which],
@@ -52,21 +50,25 @@ class Palette:
             least_width_m=self.least_width_m[which],
         )
 
-    def look_up(self, row: NDArray[np.intp], headings_rad: Floats, offsets_m: Floats, sizes: Floats) -> Floats:
-        """Depths (P, K) of rays of rows (P,) that meet the shapes of these at headings and offsets (P, K), where the
-        shapes of rows have sizes (R, K) in 0 to 1; `PAST_M` where they pass them."""
-        count, turns = self.offsets[row, None], self.turns[row, None]
+    def look_up(self, rays: tuple[NDArray[np.intp], Floats, Floats], turns_rad: Floats, sizes: Floats) -> Floats:
+        """Depths (P, K) at which rays meet the shapes of their rows, `PAST_M` where they pass them.
+
+        Rays have rows (P,), headings in rad (P, 1), and offsets in m (P, K); the shapes of R rows are turned, and have
+        sizes in 0 to 1, (R, K).
+        """
+        row, headings_rad, offsets_m = rays
         place = offsets_m * (1 / self.steps_m)[row, None]
-        place += (count // 2 + 0.5).astype(np.float32)
-        index = np.clip(place, 0, (count - 1).astype(np.float32), out=place).astype(np.int32)
-        if (turns > 1).any():
-            turned = headings_rad * np.float32(0.5 / np.pi)
-            turned += (0.5 / turns).astype(np.float32)
+        place += np.float32(OFFSETS // 2 + 0.5)
+        index = np.clip(place, np.float32(0), np.float32(OFFSETS - 1), out=place).astype(np.int32)
+        if (self.turns > 1).any():
+            turns, per_rad = self.turns[row, None], (1 / self.turn_rad).astype(np.float32)
+            turned = headings_rad * per_rad[row, None] + (0.5 / turns).astype(np.float32)
+            turned = turned - (turns_rad * per_rad[:, None])[row]
             turned -= np.floor(turned)
             turned *= turns.astype(np.float32)
-            index += np.minimum(turned.astype(np.int32), turns - 1) * count
+            index += np.minimum(turned.astype(np.int32), turns - 1) * np.int32(OFFSETS)
         size = np.clip((sizes * self.sizes[:, None]).astype(np.int32), 0, self.sizes[:, None] - 1)
-        index += (size * (self.turns * self.offsets)[:, None] + self.starts[:, None])[row]
+        index += (size * (self.turns * OFFSETS)[:, None] + self.starts[:, None]).astype(np.int32)[row]
         return self.depths_m.take(index)
 
 
@@ -81,13 +83,12 @@ def _palette(shapes: tuple[Shape, ...]) -> Palette:
     layout = np.array([one.depths_m.shape for one in profiles], dtype=np.int32).reshape(-1, 3)
     ends = np.cumsum(layout.prod(axis=1))
     depths = [np.minimum(one.depths_m, PAST_M).ravel() for one in profiles]
-    sizes, turns, offsets = layout.T
+    sizes, turns, _ = layout.T
     return Palette(
         np.concatenate(depths) if depths else np.zeros(0, dtype=np.float32),
         (ends - layout.prod(axis=1)).astype(np.int32),
         sizes,
         turns,
-        offsets,
         np.array([one.step_m for one in profiles], dtype=np.float32),
         np.array([shape.reach_m for shape in shapes]),
         np.array([shape.turn_rad for shape in shapes]),

@@ -55,10 +55,14 @@ def gap_m(first_xy: Array, second_xy: Array) -> float:
     return float(np.sqrt((offsets**2).sum(axis=-1).min()))
 
 
+def hits_of(beams: Beams, cluster: Cluster) -> NDArray[np.int64]:
+    """The indices (N,) of the hits of a cluster."""
+    return np.concatenate([segment.hits(beams) for segment in cluster])
+
+
 def points_of(beams: Beams, cluster: Cluster) -> Array:
     """The hits (N, 2) of a cluster."""
-    points: Array = beams.points_xy[np.concatenate([segment.hits(beams) for segment in cluster])]
-    return points
+    return beams.points_at(hits_of(beams, cluster))
 
 
 def near_clusters(beams: Beams, found: Sequence[Segment], near_m: float) -> list[Cluster]:
@@ -152,14 +156,14 @@ class _Surface:
 def _surfaces(beams: Beams, number: int, breaks: Breaks) -> Iterator[_Surface]:
     """The surfaces of a sweep."""
     start, end = beams.starts[number], beams.starts[number + 1]
-    ranges, points, angles = beams.ranges_m[start:end], beams.points_xy[start:end], beams.angles_rad[start:end]
+    ranges, angles = beams.ranges_m[start:end], beams.angles_rad[start:end]
     hit = np.flatnonzero(np.isfinite(ranges))
     if not len(hit):
         return
-    following = np.roll(hit, -1)
+    following, points = np.roll(hit, -1), beams.points_at(start + hit)
     steps = (following - hit) % (end - start) if len(hit) > 1 else np.array([end - start])
     apart = (angles[following] - angles[hit]) % (2 * np.pi)
-    gaps = np.hypot(*(points[following] - points[hit]).T)
+    gaps = np.hypot(*(np.roll(points, -1, axis=0) - points).T)
     near = np.minimum(ranges[hit], ranges[following])
     linked = (steps <= _LONGEST_GAP + 1) & (apart <= (_LONGEST_GAP + 2) * beams.spacing_rad[number] * 1.25)
     linked &= gaps <= farthest_link(near, np.minimum(apart, np.pi / 2), breaks)
@@ -174,7 +178,7 @@ def _surfaces(beams: Beams, number: int, breaks: Breaks) -> Iterator[_Surface]:
         places = hit[rows]
         places = places + np.concatenate([[0], np.cumsum(np.diff(places) < 0)]) * (end - start)
         ends_m = (_range_at(beams, number, int(places[0]) - 1), _range_at(beams, number, int(places[-1]) + 1))
-        yield _Surface(places, points[hit[rows]], ranges[hit[rows]], ends_m)
+        yield _Surface(places, points[rows], ranges[hit[rows]], ends_m)
 
 
 def _range_at(beams: Beams, number: int, place: int) -> float:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from toolkit.geometry.se2 import Array
 
-_FINEST_M = 0.0025
-_CELLS_ACROSS = 400
+OFFSETS = 321
+"""How many rays there are in a profile side by side; the outermost two on either side pass the shape."""
 _TURN_ERROR_M = 0.003
 _SIZES = 17
 
@@ -42,9 +42,9 @@ class Shape:
 class Profile:
     """Where rays meet a shape: `depths_m` (sizes, headings, offsets), inf for a miss.
 
-    A ray has a heading in the shape's frame, from 0 to a full turn, and passes the centre, which lies so many
-    `step_m` to its left as the offset is beyond the middle one. The depth counts from where the ray is abreast of the
-    centre, negative before.
+    A ray has a heading in the shape's frame, from 0 to where the shape looks the same again, and passes the centre,
+    which lies so many `step_m` to its left as the offset is beyond the middle one. The depth counts from where the ray
+    is abreast of the centre, negative before.
     """
 
     depths_m: NDArray[np.float32]
@@ -61,11 +61,10 @@ class Profile:
 @cache
 def profile(shape: Shape) -> Profile:
     """The shape as rays meet it."""
-    reach, step = shape.reach_m, max(_FINEST_M, 2 * shape.reach_m / _CELLS_ACROSS)
-    count = np.ceil(reach / step) + 1
-    offsets = step * np.arange(-count, count + 1)
-    turns = 1 if shape.turn_rad == 0 else int(np.ceil(np.pi * reach / _TURN_ERROR_M))
-    headings = 2 * np.pi * np.arange(turns) / turns
+    step = shape.reach_m / (OFFSETS // 2 - 2)
+    offsets: Array = step * np.arange(-(OFFSETS // 2), OFFSETS // 2 + 1, dtype=np.float64)
+    turns = max(int(np.ceil(shape.turn_rad / 2 * shape.reach_m / _TURN_ERROR_M)), 1)
+    headings = shape.turn_rad * np.arange(turns) / turns
     sizes = [None] if shape.apart_m is None else np.linspace(*shape.apart_m, _SIZES).tolist()
     depths = np.stack([_depths(shape, headings, offsets, size) for size in sizes])
     depths[..., [0, -1]] = np.inf

@@ -112,7 +112,7 @@ def windows(beams: Beams, clusters: Sequence[Cluster]) -> Windows:
     picked = [_beams_of(beams, one) for one in clusters]
     index, is_hit, beside = (np.concatenate(parts) for parts in zip(*picked, strict=True))
     cluster = np.repeat(np.arange(len(clusters)), [len(one) for one, _, _ in picked])
-    points, of = beams.points_xy[index[is_hit]], cluster[is_hit]
+    points, of = beams.points_at(index[is_hit]), cluster[is_hit]
     first = np.searchsorted(of, np.arange(len(clusters)))
     anchors = np.add.reduceat(points, first) / np.bincount(of)[:, None]
     # Of two LiDARs on either side the one that has the first hit gives the direction of view.
