@@ -1,5 +1,6 @@
 """The main job on logs of other sensors than ours, and what it says of logs that lack some, before hours are spent."""
 
+import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -11,9 +12,10 @@ import pytest
 from tests.cli.calls import call, refused
 from tests.cli.logs import write
 from tests.runs.chain import COUNT, counted, raw_messages, two_posts
-from toolkit.channels import ODOMETRY, SCAN
+from toolkit.channels import ODOMETRY, SCAN, TF
 from toolkit.messages.points import PointCloud2
 from toolkit.messages.poses import PoseStamped
+from toolkit.recording.reader import open_recording
 from toolkit.stage import Channel, Stamped
 
 CLOUD = Channel("/velodyne/points", PointCloud2)
@@ -86,6 +88,24 @@ def test_a_map_needs_odometry_which_is_said_at_once(
     assert "/slam/pose could be it, choose with --odom TOPIC" in line
     assert not looks
     assert call(*words, "--odom", POSES.topic) == 0
+
+
+@pytest.mark.parametrize(("frame", "is_written"), [("world", True), ("map", False), ("/map", False), ("", False)])
+def test_no_frame_is_its_own_parent(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], frame: str, is_written: bool
+) -> None:
+    def named(stamped: Stamped) -> Stamped:
+        message: Any = as_pose(stamped).message
+        return Stamped(POSES, stamped.log_time_ns, dataclasses.replace(message, frame_id=frame))
+
+    log, model = write(tmp_path / "log.mcap", changed(ODOMETRY, named)), two_posts(tmp_path / "model.onnx")
+    words = ("--map", tmp_path / "map.db", "--model", model, "--odom", POSES.topic)
+    assert call("map", log, *words) == 0
+    assert call("localize", log, *words, "-o", tmp_path / "out.mcap") == 0
+    with open_recording(tmp_path / "out.mcap") as recording:
+        counts = {entry.connection.topic: entry.count for entry in recording.channels}
+    assert counts.get(TF.topic, 0) == (COUNT if is_written else 0)
+    assert ("odometry names no frame of its own" in capsys.readouterr().err) != is_written
 
 
 def test_what_the_stages_found_is_told_where_nothing_can_be_mapped(

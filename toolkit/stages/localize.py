@@ -18,6 +18,7 @@ from toolkit.channels import (
     TF,
 )
 from toolkit.errors import MapError
+from toolkit.geometry.frames import plain
 from toolkit.geometry.se2 import compose, inverse
 from toolkit.landmarks.database import read_map, read_neighbours
 from toolkit.landmarks.model import LandmarkMap
@@ -29,13 +30,14 @@ from toolkit.messages.match import Status
 from toolkit.messages.poses import PoseStamped, PoseWithCovarianceStamped
 from toolkit.messages.scene import SceneObjects
 from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.stage import Bundle, OdometryAt, Stage, Stamped, Tolerance
+from toolkit.stage import Bundle, OdometryAt, Omission, Stage, Stamped, Tolerance
 from toolkit.stages._localize_joined import JoinedLocator
 from toolkit.stages._localize_thesis import locate_as_in_the_thesis
 from toolkit.stages._localize_unique import UniqueLocator
 
 # Bundles that are solved together, or calibrated from; what follows the robot takes them one by one.
 _BATCH, _FOLLOWED = 4096, 64
+_NO_FRAME = "transforms from the map to odometry that were not written, as odometry names no frame of its own"
 
 Locate = Callable[[Sequence[SceneObjects], Sequence[OdometryAt | None]], list[Match]]
 
@@ -79,8 +81,10 @@ class LocalizeConfig:
     thesis_guess_m: tuple[float, float] = (0.0, 0.0)
 
 
-def process(bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Path]) -> Iterator[Stamped]:
-    """Match and pose of every bundle, the map once before the first."""
+def process(
+    bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Path]
+) -> Iterator[Stamped | Omission]:
+    """Match and pose of every bundle, the map once before the first; a transform that cannot be is an omission."""
     landmark_map = _usable_map(resources["map"])
     locate, size = _method(resources["map"], landmark_map, config)
     stream, first = iter(bundles), True
@@ -118,7 +122,7 @@ def _method(path: Path, landmark_map: LandmarkMap, config: LocalizeConfig) -> tu
     return joined.locate, _FOLLOWED if config.join_m > 0 else _BATCH
 
 
-def _messages(bundle: Bundle, match: Match, frame: str, config: LocalizeConfig) -> Iterator[Stamped]:
+def _messages(bundle: Bundle, match: Match, frame: str, config: LocalizeConfig) -> Iterator[Stamped | Omission]:
     yield Stamped(MATCH, bundle.log_time_ns, match.message)
     if match.message.status != Status.LOCALIZED or match.pose is None:
         return
@@ -131,6 +135,9 @@ def _messages(bundle: Bundle, match: Match, frame: str, config: LocalizeConfig) 
     message = PoseWithCovarianceStamped.planar(stamp_ns, frame, pose, match.covariance)
     yield Stamped(POSE_COVARIANCE, bundle.log_time_ns, message)
     if config.tf == "auto" and bundle.odometry is not None:
+        if plain(bundle.odometry.frame_id) in ("", plain(frame)):  # readers refuse transforms from a frame to itself
+            yield Omission(bundle.log_time_ns, _NO_FRAME)
+            return
         map_from_odom = compose(pose, inverse(bundle.odometry.odom_from_base))
         transform = Transform.planar(stamp_ns, (frame, bundle.odometry.frame_id), map_from_odom)
         yield Stamped(TF, bundle.log_time_ns, TFMessage((transform,)))
