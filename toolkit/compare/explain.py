@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi_square
+from scipy.special import chdtrc
 
 from toolkit.estimation.pose import position_sigma, solve_poses
 from toolkit.estimation.sightings import polar_from_points
@@ -170,7 +170,7 @@ def conditions_of(situation: Situation, places: tuple[Place, ...]) -> tuple[Cond
         return tuple(found)
     best = places[0]
     if best.dof > 0:
-        probability = float(chi_square.sf(best.chi2, best.dof))
+        probability = float(chdtrc(best.dof, best.chi2))
         limit = limits.consistency if unique else _SET
         found.append(_at_least("fit", probability, limit, f"probability of chi2 {best.chi2:.1f} at dof {best.dof}"))
     if match.status != Status.AMBIGUOUS:

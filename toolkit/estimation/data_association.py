@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from toolkit.geometry import se2
 from toolkit.geometry.angles import wrap
@@ -34,8 +34,8 @@ class Gates:
     Between the two an observation is evidence for neither and stays unlabelled.
     """
 
-    same: float = float(chi2.ppf(0.999, 2))
-    new: float = 2 * float(chi2.ppf(0.9999, 2))
+    same: float = float(chdtri(2, 0.001))
+    new: float = 2 * float(chdtri(2, 0.0001))
 
 
 class LandmarkFilter:
@@ -118,7 +118,7 @@ class LandmarkFilter:
             miss, jacobian, noise = self._stack(columns, points_xy[rows], covariances[rows])
             spread = jacobian @ self.covariance @ jacobian.T + noise
             solved = np.linalg.solve(spread, miss)
-            if miss @ solved <= chi2.ppf(0.999, len(miss)):
+            if miss @ solved <= chdtri(len(miss), 0.001):
                 break
             worst = int(np.argmax(_saved_by_leaving_out(solved, np.linalg.inv(spread))))
             rows, columns = np.delete(rows, worst), np.delete(columns, worst)

@@ -7,8 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
-from scipy.stats import chi2 as chi_square
+from scipy.special import chdtri, logsumexp
 
 from toolkit.geometry import se2
 from toolkit.landmarks.acceptance import ClassEvidence, PairDensity
@@ -80,7 +79,7 @@ class Matcher:
         spread = np.where(unknown[:, None, None], config.map_sigma_m**2 * np.eye(2), index.covariances)
         sigma_m = float(np.sqrt(np.quantile(spread[:, [0, 1], [0, 1]].max(axis=1), 0.9)))
         self._finder = Finder(index, sigma_m)
-        self.verifier = Verifier(index, spread, float(chi_square.isf(_OBJECT, 2)))
+        self.verifier = Verifier(index, spread, float(chdtri(2, _OBJECT)))
 
     def objects(self, scene: SceneObjects) -> Objects:
         """The nearest objects of a scene whose classes the map knows.
@@ -122,7 +121,7 @@ class Matcher:
         if not len(candidates.of):
             return [None] * len(sets)
         fits = self.verifier.fit(sets, candidates)
-        possible = fits.chi2 <= chi_square.isf(_SET, np.maximum(fits.dof, 1))
+        possible = fits.chi2 <= chdtri(np.maximum(fits.dof, 1), _SET)
         fits = fits.pick(possible & (fits.dof > 0) & np.isfinite(fits.log_ratio))
         fits = fits.pick(np.lexsort((-fits.log_ratio, fits.candidates.of)))
         bounds = np.searchsorted(fits.candidates.of, np.arange(len(sets) + 1))

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from toolkit.estimation import closed_form
 from toolkit.landmarks.index import MapIndex, side_lengths
@@ -37,7 +37,7 @@ _CLEARLY = 5.0
 _HEADING_RAD = 0.2
 # A box around the sides holds nearly all of the ellipsoid that the gate lets pass.
 _BOX_SIGMAS = 3.5
-_GATE = float(chi2.ppf(0.9995, 3))
+_GATE = float(chdtri(3, 0.0005))
 # Classes at least so likely, against the likeliest of an object, are looked for too.
 _PLAUSIBLE, _PLAUSIBLE_IN_SMALL = 0.1, 5e-3
 # Share of a side's variance that no other side has: without it, three objects exactly in line would have none.

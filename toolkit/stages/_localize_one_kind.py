@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from toolkit.estimation.batch import PoseSolutions
 from toolkit.estimation.bearings import solve_bearings
@@ -62,7 +62,7 @@ def _judge(
     odds = np.exp(-(chi2_of - chi2_of[0]) / 2)
     apart = np.linalg.norm(both[1] - position) > _SAME_SIGMAS * sigma_m
     status = Status.LOCALIZED
-    if chi2_of[0] > chi2.ppf(1 - settings.consistency, max(dof, 1)):
+    if chi2_of[0] > chdtri(max(dof, 1), settings.consistency):
         status = Status.INCONSISTENT
     elif sigma_m > settings.max_sigma_m:
         status = Status.WEAK_GEOMETRY

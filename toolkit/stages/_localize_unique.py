@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from toolkit.estimation.batch import PoseSolutions
 from toolkit.estimation.calibration import SensorModel, calibrate
@@ -138,7 +138,7 @@ def _fitting(
     mask = mask.copy()
     while True:
         solutions = solve(mask)
-        fits = solutions.chi2 <= chi2.ppf(1 - settings.consistency, np.maximum(solutions.dof, 1))
+        fits = solutions.chi2 <= chdtri(np.maximum(solutions.dof, 1), settings.consistency)
         worse: Rows = np.flatnonzero(~fits & (mask.sum(axis=1) > least))
         if not len(worse):
             return solutions, mask, fits
