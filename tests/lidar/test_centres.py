@@ -96,6 +96,18 @@ def test_the_bounding_misses_tell_where_a_thing_of_one_hit_is() -> None:
     assert across < 0.03
 
 
+def test_what_beams_pass_through_has_holes_or_is_none() -> None:
+    rng = np.random.default_rng(5)
+    feet = [box(4.0, side * 0.58, np.pi / 2, 0.07, 0.38) for side in (1, -1)]
+    beams = sweep(ANGLES_RAD, ranges(feet, rng), np.eye(4))
+    cluster = tuple(segments(beams, BREAKS, 2.0))
+    bench = Shape(boxes=((0.0, 0.58, 0.38, 0.07), (0.0, -0.58, 0.38, 0.07)), turn_rad=np.pi)
+    evidence = centres(windows(beams, [cluster]), [bench, shapes.box(1.6, 1.0)], Noise()).log_evidence[0]
+    assert len(cluster) == 2
+    assert np.isfinite(evidence[0])
+    assert np.isinf(evidence[1])
+
+
 def test_an_occluded_side_leaves_the_centre_open_there() -> None:
     rng = np.random.default_rng(0)
     thing = disc(5.0, 0.0, 0.25)
