@@ -10,17 +10,19 @@ _REMEMBERED, _TOO_FAR_ASIDE = 5, 4.0
 class Weighing:
     """How much a detection or the lack of one counts.
 
-    A track is of a class with odds `prior` before anything is seen. A detection of score s multiplies the odds of its
-    class by `gain` * s / (1 - s), and those of every other by `confusion` times that, since some detections have a
-    wrong class; an image that should show the object but has no box there multiplies all by `missed`. Odds stay below
-    `most`, so that what was learned wrong can be forgotten.
+    A track is of a class with odds `prior` before anything is seen. A detection multiplies the odds of its class by how
+    much likelier it is if the track is of it, at most by `gain`, and those of every other by `confusion` times that,
+    since some detections have a wrong class; an image that should show the object but has no box there multiplies all
+    by `missed`. Odds stay below `most`, so that what was learned wrong can be forgotten. A track that no later scan
+    can go on with begins at odds `prior_alone`: no second look could mend what is left out.
     """
 
-    prior: float = 0.05
-    gain: float = 60.0
+    prior: float = 0.03
+    prior_alone: float = 0.3
+    gain: float = 200.0
     confusion: float = 0.05
-    missed: float = 0.5
-    most: float = 1e4
+    missed: float = 0.2
+    most: float = 1e3
 
 
 @dataclass(slots=True)
@@ -31,6 +33,7 @@ class Belief:
     """
 
     weighing: Weighing
+    alone: bool = False
     other: float = 0.0
     log_odds: dict[str, float] = field(default_factory=dict)
     radii_m: dict[str, float] = field(default_factory=dict)
@@ -38,38 +41,47 @@ class Belief:
     aside: float = 0.0
 
     def __post_init__(self) -> None:
-        self.other = math.log(self.weighing.prior)
+        self.other = math.log(self.weighing.prior_alone if self.alone else self.weighing.prior)
 
-    def hit(self, name: str, score: float, aside: float) -> None:
+    def hit(self, name: str, ratio: float, aside: float, fresh: float) -> None:
         """A detection of a class fell on the track, so many sigmas aside of its middle.
 
+        `ratio` is how much likelier it is if the track is of the class than if not. It counts to a share `fresh`.
         If they always do so on the same side, they are of something beside it, and count as a miss.
         """
         self.hits += 1
         self.aside += (aside - self.aside) / min(self.hits, _REMEMBERED)
         if self.hits > 1 and abs(self.aside) * math.sqrt(min(self.hits, _REMEMBERED)) > _TOO_FAR_ASIDE:
-            self.miss()
+            self.miss(fresh)
             return
-        weighing, sure = self.weighing, min(max(score, 0.05), 0.95)
-        gain = math.log(weighing.gain * sure / (1 - sure))
-        confused = gain + math.log(weighing.confusion)
+        weighing = self.weighing
+        whole = weighing.missed + (1 - weighing.missed) * min(ratio, weighing.gain)
+        gain, confused = fresh * math.log(whole), math.log(weighing.confusion)
         self.log_odds.setdefault(name, self.other)
-        self.log_odds = {known: value + confused for known, value in self.log_odds.items()}
-        self.log_odds[name] += gain - confused
-        self.other += confused
+        self.log_odds = {known: value + gain + confused for known, value in self.log_odds.items()}
+        self.log_odds[name] -= confused
+        self.other += gain + confused
         self._limit()
 
-    def miss(self) -> None:
-        """An image shows the track's place, and nothing there."""
-        lost, least = math.log(self.weighing.missed), math.log(self.weighing.prior / self.weighing.most)
-        self.log_odds = {name: max(value + lost, least) for name, value in self.log_odds.items()}
-        self.other = max(self.other + lost, least)
+    def miss(self, fresh: float) -> None:
+        """An image shows the track's place, and nothing there; it counts to a share `fresh`."""
+        lost = fresh * math.log(self.weighing.missed)
+        self.log_odds = {name: value + lost for name, value in self.log_odds.items()}
+        self.other += lost
+        self._limit()
 
     def _limit(self) -> None:
-        over = max(*self.log_odds.values(), self.other) - math.log(self.weighing.most)
-        if over > 0:
-            self.log_odds = {name: value - over for name, value in self.log_odds.items()}
-            self.other -= over
+        """Keep what is said for and against the track within bounds."""
+        least = math.log(self.weighing.prior / self.weighing.most)
+        over = max(max([*self.log_odds.values(), self.other]) - math.log(self.weighing.most), 0.0)
+        self.log_odds = {name: max(value - over, least) for name, value in self.log_odds.items()}
+        self.other = max(self.other - over, least)
+
+    def share(self, name: str) -> float:
+        """The probability that the track is of a class."""
+        odds = {known: math.exp(value) for known, value in self.log_odds.items()}
+        own = odds.get(name, math.exp(self.other))
+        return own / (1 + sum(odds.values()) + (0.0 if name in odds else own))
 
     def probabilities(self) -> list[tuple[str, float]]:
         """Classes that detections named with their probabilities, most probable first."""

@@ -2,25 +2,37 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from toolkit.geometry.se2 import Array
+from toolkit.geometry.angles import wrap
+from toolkit.geometry.se2 import Array, transform_points
 from toolkit.messages.detections import Detections
 from toolkit.messages.scan_objects import ScanObjects
 from toolkit.messages.scene import SceneObjects
 from toolkit.stages._fuse_belief import Belief, Weighing
 from toolkit.stages._fuse_centres import Centres, centres_of, fits_of, radii_in_boxes
+from toolkit.stages._fuse_rivals import Past, is_redundant, shown
 from toolkit.stages._fuse_sights import BoxError, Sights, View, misfits, sights_of
 from toolkit.stages._fuse_sizes import ANY_SIZE, Size
 
 _NEVER = 1e6
 _KEPT_BUNDLES = 1000
-_LEAST_SHARE = 0.02
-_ALONE = 12.0
-"""What it costs a box to be of nothing in the scan, such as an object too far away or too thin for the LiDAR."""
+_UNSEEN_PER_RAD = 0.3
+"""Boxes of a class, per image and radian, of what is too far away, too thin or hidden for the LiDAR."""
+_REMEMBERED_NS, _MOVED_M = 60 * 10**9, 0.3
+_ASIDE, _UPRIGHT = 1.3, 2.0
+"""How much more chi-squares of bearing and size tell than sigmas say, which are wide for gates."""
+_APART = 1.25
+"""Two objects of one class are farther apart than this many of its radii."""
+_LEAST_FIT = 0.05
+"""Real objects differ from the shapes of their class, so that a scan never speaks more against it."""
+_USUAL_FIT = 0.5
+"""How well the scan fits a class where it does not speak for it or against it."""
+_TURNED_RAD, _NEARER, _STALE = 0.035, 0.1, 0.15
+"""Images from nearly the same place say the same: what counts as another place, and what they count at least."""
 _LEAST_TOLD = 0.005
 _SMALLER = 0.8
 """How much smaller than usual an object may be that is before another one."""
@@ -43,11 +55,13 @@ class Rules:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Candidates:
-    """M boxes as N objects: costs (M, N), very high where it cannot be; how far aside the object is (M, N), in sigmas;
-    radii_m (M, N) that it would have.
+    """M boxes as N objects: ratios (M, N), how much likelier a box is if it is of an object than if it is of something
+    that the scan does not show, 0 where it cannot be; the same with what is known of the objects in `odds` (M, N); how
+    far aside the object is (M, N), in sigmas; radii_m (M, N) that it would have.
     """
 
-    costs: Array
+    ratios: Array
+    odds: Array
     aside: Array
     radii_m: Array
 
@@ -56,6 +70,11 @@ class _Candidates:
 class _Track:
     belief: Belief
     seen: int
+    seen_ns: int = 0
+    viewed: tuple[float, float] | None = None  # direction in the odometry frame, logarithm of the distance
+    place_xy: Array | None = None  # where it was last, in the odometry frame, if its class is known
+    past: Past = field(default_factory=Past)
+    redundant: bool = False
 
 
 class Fuser:
@@ -67,30 +86,86 @@ class Fuser:
         self._bundle = 0
         self._shaped: set[str] = set()  # classes that the scans' shapes are of
 
-    def add(self, objects: ScanObjects, detections: Detections | None, view: View | None) -> tuple[SceneObjects, int]:
+    def add(
+        self, objects: ScanObjects, detections: Detections | None, view: View | None, odometry: Array | None
+    ) -> tuple[SceneObjects, int]:
         """The scene at a scan, with what an image beside it shows; also the number of boxes that nothing explains."""
         self._bundle += 1
         self._shaped.update(name for options in objects.hypotheses for name, _ in options)
         for name in objects.ids:
-            track = self._tracks.setdefault(name, _Track(Belief(self._rules.weighing), 0))
-            track.seen = self._bundle
+            track = self._tracks.setdefault(name, _Track(Belief(self._rules.weighing, alone=odometry is None), 0))
+            track.seen, track.seen_ns = self._bundle, objects.stamp_ns
         self._tracks = {k: track for k, track in self._tracks.items() if track.seen > self._bundle - _KEPT_BUNDLES}
         unexplained = 0
+        if odometry is not None:
+            self._inherit(objects, odometry)
         if detections is not None and view is not None:
-            unexplained = self._learn(objects, detections, view)
+            unexplained = self._learn(objects, detections, view, odometry)
+        if odometry is not None:
+            self._place(objects, odometry)
+            if detections is not None:
+                self._compare(objects.stamp_ns)
         return self._scene(objects), unexplained
 
-    def _learn(self, objects: ScanObjects, detections: Detections, view: View) -> int:
+    def _inherit(self, objects: ScanObjects, odom_from_base: Array) -> None:
+        """Objects that no box has named are what was known in their place, if that is not seen any more.
+
+        A scan may show another part of it now: another leg of a chair, or the other wheel of a bicycle.
+        """
+        lost = {
+            name: track
+            for name, track in self._tracks.items()
+            if track.place_xy is not None and 0 < objects.stamp_ns - track.seen_ns <= _REMEMBERED_NS
+        }
+        unnamed = [i for i, name in enumerate(objects.ids) if not self._tracks[name].belief.log_odds]
+        if not (lost and unnamed):
+            return
+        surfaces = transform_points(odom_from_base, np.array([objects.positions_xy[i][-1] for i in unnamed]))
+        places = np.array([track.place_xy for track in lost.values()])
+        away = np.hypot(*(surfaces[:, None] - places).transpose(2, 0, 1))
+        donors = list(lost)
+        for row, column in zip(*np.unravel_index(np.argsort(away, axis=None), away.shape), strict=True):
+            donor, heir = donors[column], objects.ids[unnamed[row]]
+            if donor not in self._tracks or self._tracks[heir].belief.log_odds:
+                continue
+            belief = self._tracks[donor].belief
+            name, _ = belief.probabilities()[0]
+            fits = fits_of(objects, unnamed[row]).get(name, 0.0 if name in self._shaped else 1.0)
+            if away[row, column] <= self._radius(donor, name) + _MOVED_M and fits >= _RESOLVED:
+                self._tracks[heir].belief, self._tracks[heir].viewed = belief, self._tracks[donor].viewed
+                self._tracks[heir].past = self._tracks[donor].past
+                del self._tracks[donor]
+
+    def _place(self, objects: ScanObjects, odom_from_base: Array) -> None:
+        """Note where the objects are whose class is known."""
+        for i, track in enumerate(objects.ids):
+            belief = self._tracks[track].belief
+            options = belief.probabilities() if belief.log_odds else []
+            rows = [k for k, (name, _) in enumerate(objects.hypotheses[i]) if options and name == options[0][0]]
+            sure = bool(options) and options[0][1] >= self._rules.least_probability
+            place = transform_points(odom_from_base, objects.positions_xy[i][rows[0] if rows else -1])
+            self._tracks[track].place_xy = place if sure else None
+            if sure:
+                self._tracks[track].past.places[self._bundle] = place
+
+    def _learn(self, objects: ScanObjects, detections: Detections, view: View, odometry: Array | None) -> int:
+        heading_rad = 0.0 if odometry is None else float(odometry[2])
         sights = sights_of(view, detections.boxes_xyxy, self._rules.error)
         beliefs = [self._tracks[name].belief for name in objects.ids]
         named = [options[0] for options in detections.hypotheses]
         names = [name for name, _ in named]
         candidates = self._candidates(objects, beliefs, names, sights, view)
-        pairs = _assigned(candidates.costs)
+        pairs = _assigned(candidates.odds)
+        places = np.array([positions[-1] for positions in objects.positions_xy]).reshape(-1, 2)
         for box, i in pairs:
             name, score = named[box]
-            rivals = np.exp((candidates.costs[box, i] - np.append(candidates.costs[box], _ALONE)) / 2)
-            beliefs[i].hit(name, score / float(rivals.sum()), float(candidates.aside[box, i]))
+            taken = [j for other, j in pairs if other != box]
+            rivals = 1.0 + float(np.delete(candidates.odds[box], [i, *taken]).sum())
+            ratio = 1 - score + score * float(candidates.ratios[box, i]) / rivals
+            fresh = self._fresh(objects.ids[i], places[i], heading_rad)
+            beliefs[i].hit(name, ratio, float(candidates.aside[box, i]), fresh)
+            if odometry is not None and fresh > _STALE:
+                self._tracks[objects.ids[i]].past.note(shown(self._bundle, name, box, sights, view, odometry))
             if not (sights.cut[box, 0] or sights.cut[box, 2]):
                 before = beliefs[i].radii_m.get(name, candidates.radii_m[box, i])
                 beliefs[i].radii_m[name] = float(0.7 * before + 0.3 * candidates.radii_m[box, i])
@@ -98,25 +173,51 @@ class Fuser:
         nearness = self._nearness(objects, pairs, view, names, sights)
         for i, belief in enumerate(beliefs):
             if belief.log_odds and i not in hit and self._is_missed(objects, i, belief, sights, nearness, view):
-                belief.miss()
+                belief.miss(self._fresh(objects.ids[i], places[i], heading_rad))
         return len(detections) - len(pairs)
+
+    def _compare(self, stamp_ns: int) -> None:
+        """Find the tracks whose boxes were of another one."""
+        known: dict[str, list[_Track]] = {}
+        for track in self._tracks.values():
+            track.redundant = False
+            if track.place_xy is not None and stamp_ns - track.seen_ns <= _REMEMBERED_NS:
+                known.setdefault(track.belief.probabilities()[0][0], []).append(track)
+        for name, tracks in known.items():
+            size = self._rules.sizes.get(name, ANY_SIZE)
+            for one in tracks:
+                others = (other for other in tracks if other is not one and not other.redundant)
+                one.redundant = any(is_redundant(one.past, other.past, name, size) for other in others)
+
+    def _fresh(self, name: str, place_xy: Array, heading_rad: float) -> float:
+        """How much an image says about a track that the images before have not said."""
+        track = self._tracks[name]
+        before = track.viewed
+        track.viewed = heading_rad + math.atan2(place_xy[1], place_xy[0]), math.log(max(np.hypot(*place_xy), 0.1))
+        if before is None:
+            return 1.0
+        turned, nearer = abs(wrap(track.viewed[0] - before[0])), abs(track.viewed[1] - before[1])
+        return float(np.clip(turned / _TURNED_RAD + nearer / _NEARER, _STALE, 1.0))
 
     def _candidates(
         self, objects: ScanObjects, beliefs: list[Belief], names: list[str], sights: Sights, view: View
     ) -> _Candidates:
         """Every box as every object."""
         rules, shape = self._rules, (len(names), len(objects))
-        found = _Candidates(np.full(shape, _NEVER), np.zeros(shape), np.zeros(shape))
+        found = _Candidates(np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape))
         for box, name in enumerate(names):
             size = rules.sizes.get(name, ANY_SIZE)
             found.radii_m[box] = radii_in_boxes(objects, view, sights, box, size)
             centres = centres_of(objects, name, found.radii_m[box], has_shape=name in self._shaped)
             places = centres.positions_xy, centres.covariances
-            aside, upright = misfits(view, sights, box, places, size, rules.error)
-            earned = np.array([max(_share(belief, name), _LEAST_SHARE) for belief in beliefs])
-            total = aside**2 + upright - 2 * np.log(centres.fits) - 2 * np.log(earned)
+            aside, sigma, upright = misfits(view, sights, box, places, size, rules.error)
             possible = (aside**2 <= rules.bearing_gate) & (upright <= rules.size_gate)
-            found.costs[box], found.aside[box] = np.where(possible, total, _NEVER), aside
+            density = np.exp(-(_ASIDE * aside**2 + _UPRIGHT * upright) / 2) / (math.sqrt(2 * math.pi / _ASIDE) * sigma)
+            fits = np.maximum(centres.fits, _LEAST_FIT) / _USUAL_FIT
+            told = 1.0 if sights.cut[box, [1, 3]].any() else size.telling
+            ratios = np.where(possible, told * density / _UNSEEN_PER_RAD * fits, 0.0)
+            odds = np.array([belief.share(name) for belief in beliefs])
+            found.ratios[box], found.odds[box], found.aside[box] = ratios, ratios * odds, aside
         return found
 
     def _nearness(
@@ -157,7 +258,7 @@ class Fuser:
         for i, track in enumerate(objects.ids):
             belief = self._tracks[track].belief
             options = belief.probabilities() if belief.log_odds else []
-            if options and self._is_clear(objects, i, *options[0]):
+            if options and not self._tracks[track].redundant and self._is_clear(objects, i, *options[0]):
                 told = tuple((name, share) for name, share in options if share >= _LEAST_TOLD)
                 found.append((options[0][1], i, told))
         kept: list[tuple[int, tuple[tuple[str, float], ...], Array, Array, float]] = []
@@ -166,7 +267,7 @@ class Fuser:
             centres = self._centres(objects, name)
             position, radius = centres.positions_xy[i], self._radius(objects.ids[i], name)
             same = [entry for entry in kept if entry[1][0][0] == name]
-            if all(np.hypot(*(position - other[2])) > radius for other in same):
+            if all(np.hypot(*(position - other[2])) > _APART * radius for other in same):
                 kept.append((i, told, position, centres.covariances[i], radius))
         kept.sort(key=lambda entry: entry[0])
         return SceneObjects(
@@ -189,16 +290,10 @@ class Fuser:
         return size.radius_m if size else self._tracks[track].belief.radii_m.get(name, 0.0)
 
 
-def _share(belief: Belief, name: str) -> float:
-    """How much of a track's odds a class has, nothing included."""
-    odds = {known: math.exp(value) for known, value in belief.log_odds.items()}
-    own = odds.get(name, math.exp(belief.other))
-    return own / (1 + sum(odds.values()) + (0.0 if name in odds else own))
-
-
-def _assigned(costs: Array) -> list[tuple[int, int]]:
-    """Pairs (box, object) of the assignment that costs least, where a box alone costs more than any pair may."""
-    boxes, objects = costs.shape
-    alone = np.full((boxes, boxes), _NEVER / 2)
-    rows, columns = linear_sum_assignment(np.hstack([costs, alone]))
-    return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if j < objects and costs[i, j] < _NEVER]
+def _assigned(odds: Array) -> list[tuple[int, int]]:
+    """Pairs (box, object) of the most likely assignment, where a box may be of nothing in the scan."""
+    boxes, objects = odds.shape
+    with np.errstate(divide="ignore"):
+        costs = np.hstack([np.maximum(-np.log(odds), -_NEVER), np.zeros((boxes, boxes))])
+    rows, columns = linear_sum_assignment(np.where(np.isfinite(costs), costs, _NEVER))
+    return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if j < objects and odds[i, j] > 1]

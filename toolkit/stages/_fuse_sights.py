@@ -122,10 +122,11 @@ def sights_of(view: View, boxes_xyxy: Array, error: BoxError) -> Sights:
 
 def misfits(
     view: View, sights: Sights, box: int, centres: tuple[Array, Array], size: Size, error: BoxError
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """How badly one box fits objects with centres (N, 2) and covariances (N, 2, 2), if they have a size.
 
-    Returns how far to the left of the box they are (N,), in sigmas, and chi-squares (N,) of height and width.
+    Returns how far to the left of the box they are (N,), in sigmas, those sigmas in rad (N,), and chi-squares (N,) of
+    height and width.
     """
     places = view.from_camera(centres[0])
     distance = np.maximum(np.hypot(places[:, 0], places[:, 1]), 0.05)
@@ -134,26 +135,30 @@ def misfits(
     spread = np.einsum("ni,nij,nj->n", turned, centres[1], turned)
     bearing = np.arctan2(places[:, 1], places[:, 0])
     own = np.hypot(error.bearing_rad, view.turned_rad) ** 2 + (spread + error.lateral_m**2) / distance**2
-    sideways = _sideways(sights, box, bearing, distance, own, size)
-    return sideways, _upright(sights, box, distance, view.base_from_camera[2, 3], size)
+    sideways, sigma = _sideways(sights, box, bearing, distance, own, size)
+    return sideways, sigma, _upright(sights, box, distance, view.base_from_camera[2, 3], size)
 
 
-def _sideways(sights: Sights, box: int, bearing: Array, distance: Array, variance: Array, size: Size) -> Array:
+def _sideways(
+    sights: Sights, box: int, bearing: Array, distance: Array, variance: Array, size: Size
+) -> tuple[Array, Array]:
+    """How far to the left of a box objects are (N,), in sigmas, and those sigmas in rad (N,)."""
     left_cut, _, right_cut, _ = sights.cut[box].tolist()
     off = wrap(bearing - sights.middle[box])
     half = abs(float(wrap(sights.left[box] - sights.right[box]))) / 2
     if left_cut and right_cut:
-        return np.where(np.abs(off) <= half, 0.0, off / np.sqrt(variance))
+        return np.where(np.abs(off) <= half, 0.0, off / np.sqrt(variance)), np.sqrt(variance) + half
     if not (left_cut or right_cut):
         variance = variance + sights.sigma_rad[box] ** 2 / 2 + (_OFF_MIDDLE * half) ** 2
-        return np.asarray(off / np.sqrt(variance))
+        return np.asarray(off / np.sqrt(variance)), np.sqrt(variance)
     # Its middle is half of the object's width from the free edge, and the object is at least as wide as what shows.
     narrow, wide = (np.arctan(width / 2 / distance) for width in size.width_m)
     from_edge = half + (off if left_cut else -off)
     nearest = np.maximum(narrow, half)
     beyond = from_edge - np.clip(from_edge, nearest, np.maximum(nearest, wide))
     towards = 1.0 if left_cut else -1.0
-    return np.asarray(towards * beyond / np.sqrt(variance + sights.sigma_rad[box] ** 2))
+    sigma = np.sqrt(variance + sights.sigma_rad[box] ** 2)
+    return np.asarray(towards * beyond / sigma), sigma
 
 
 def _upright(sights: Sights, box: int, distance: Array, camera_m: float, size: Size) -> Array:

@@ -1,8 +1,12 @@
 """How large objects are, as far as an image shows it: by class, for the classes that a street has."""
 
+import math
 from dataclasses import dataclass
 
 Span = tuple[float, float]
+
+_DISTANCES, _BLURRED = math.log(10.0), 0.2
+"""Logarithms of the ratio of the farthest and the nearest distance of what a camera shows, and of errors of height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +28,12 @@ class Size:
     def least_tall_m(self) -> float:
         """The least height of a box."""
         return max(self.tall_m[0], self.top_m[0] - self.foot_m[1])
+
+    @property
+    def telling(self) -> float:
+        """How much likelier a box's height is at the object's distance than at any that there could be."""
+        most = min(self.tall_m[1], self.top_m[1] - self.foot_m[0])
+        return max(1.0, _DISTANCES / (math.log(most / self.least_tall_m) + _BLURRED))
 
 
 SIZES: dict[str, Size] = {

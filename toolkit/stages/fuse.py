@@ -43,10 +43,11 @@ class FuseConfig:
     the chi-squares of their bearing and of its height and width are below `bearing_gate` and `size_gate`. Boxes are
     sure to `edge_px` and `edge_share` of their size, bearings to `bearing_sigma_deg`, and an object's parts that the
     LiDAR meets lie within `lateral_m` of its middle. `prior_odds`, `hit_odds`, `confusion`, `miss_odds`, `max_odds` say
-    how evidence adds up along a track: its odds of being of a class at first, how a detection raises them (at a score
-    of 0.5), the share of that for every other class, what an image without it leaves of them if it would be
-    `min_height_px` high there, and the most that they get. `rectified` images have no distortion and the projection
-    matrix of CameraInfo. The thesis (Algorithm 3) sorts boxes about `image_centre_px`.
+    how evidence adds up along a track: its odds of being of a class at first (`prior_odds_alone` without odometry,
+    where every scan is on its own), the most that one detection multiplies them by, the share of that for every other
+    class, what an image without it leaves of them if it would be `min_height_px` high there, and the most that they
+    get. `rectified` images have no distortion and the projection matrix of CameraInfo. The thesis (Algorithm 3) sorts
+    boxes about `image_centre_px`.
     """
 
     method: Literal["default", "thesis"] = "default"
@@ -61,11 +62,12 @@ class FuseConfig:
     edge_share: Share = 0.04
     bearing_sigma_deg: Positive = 0.3
     lateral_m: Positive = 0.05
-    prior_odds: Positive = 0.05
-    hit_odds: Positive = 60.0
+    prior_odds: Positive = 0.03
+    prior_odds_alone: Positive = 0.3
+    hit_odds: Positive = 200.0
     confusion: Share = 0.05
-    miss_odds: Share = 0.5
-    max_odds: Positive = 1e4
+    miss_odds: Share = 0.2
+    max_odds: Positive = 1e3
     min_height_px: Positive = 20.0
     rectified: bool = False
     image_centre_px: float = 320.5
@@ -92,7 +94,8 @@ def process(
             scene, unexplained = fuse_in_order(objects, detections, config.image_centre_px)
         else:
             view = None if detections is None else _view(bundle, detections, objects, mounting, config)
-            scene, unexplained = fuser.add(objects, detections, view)
+            odometry = None if bundle.odometry is None else bundle.odometry.odom_from_base
+            scene, unexplained = fuser.add(objects, detections, view, odometry)
         if len(scene) < config.min_objects:
             scene = _nothing(scene)
         yield Stamped(SCENE_OBJECTS, bundle.log_time_ns, scene)
@@ -116,11 +119,22 @@ def _rules(config: FuseConfig) -> Rules:
     return Rules(
         sizes={**SIZES, **config.sizes},
         error=BoxError(config.edge_px, config.edge_share, bearing_rad, config.lateral_m),
-        weighing=Weighing(config.prior_odds, config.hit_odds, config.confusion, config.miss_odds, config.max_odds),
+        weighing=_weighing(config),
         bearing_gate=config.bearing_gate,
         size_gate=config.size_gate,
         least_probability=config.min_probability,
         least_height_px=config.min_height_px,
+    )
+
+
+def _weighing(config: FuseConfig) -> Weighing:
+    return Weighing(
+        prior=config.prior_odds,
+        prior_alone=config.prior_odds_alone,
+        gain=config.hit_odds,
+        confusion=config.confusion,
+        missed=config.miss_odds,
+        most=config.max_odds,
     )
 
 
