@@ -99,6 +99,23 @@ def test_a_frame_above_odom_is_left_alone(folder: Path, tmp_path: Path, capsys: 
     assert "odom has a parent frame already" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(("parent", "child", "written"), [("map", "wheels", False), ("wheels", "odom", True)])
+def test_the_frame_that_counts_is_that_of_the_odometry(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], parent: str, child: str, written: bool
+) -> None:
+    transform = Transform.planar(1, (parent, child), (0, 0, 0))
+    driven = [
+        Stamped(stamped.channel, stamped.log_time_ns, dataclasses.replace(stamped.message, frame_id="wheels"))
+        if stamped.channel == ODOMETRY
+        else stamped
+        for stamped in messages(seed=2)
+    ]
+    log = write(tmp_path / "log.mcap", [Stamped(TF, 1, TFMessage((transform,))), *driven])
+    assert call("localize", log, "--map", folder / "a.db", "-o", tmp_path / "out.mcap") == 0
+    assert (topics(tmp_path / "out.mcap")[TF.topic] > 1) == written
+    assert ("wheels has a parent frame already" in capsys.readouterr().err) != written
+
+
 def without(channel: Channel, content: list[Stamped]) -> list[Stamped]:
     return [stamped for stamped in content if stamped.channel != channel]
 

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from toolkit.channels import ANNOTATIONS, CAMERA_IMAGE, ODOM_FRAME, ODOMETRY, TF, TF_STATIC
-from toolkit.errors import RecordingError, UsageError
+from toolkit.errors import MessageError, RecordingError, UsageError
 from toolkit.manifest import RUN, Manifest, Outcome, StageRecord
 from toolkit.messages.codec import decode
+from toolkit.recording.trail import odometry_from
 from toolkit.recording.writer import create_recording
 from toolkit.runs.bundles import Reading, Span, held_before, inputs_of, read_bundles
-from toolkit.runs.inputs import beside_camera_info, choose
+from toolkit.runs.inputs import beside_camera_info, choose, message_type
 from toolkit.runs.plan import Step
 from toolkit.runs.tallies import tally
 from toolkit.runs.thinning import Thinning, thin
@@ -29,7 +30,7 @@ def run_step(step: Step, view: View, span: Span, thinning: Thinning, target: Pat
     stage, reading, counts = step.stage, Reading(), Counter[str]()
     inputs = inputs_of(view, stage.reads, stage.reads[:1], span.choice)
     primary = next(connection for connection, channel in inputs.items() if channel == stage.reads[0])
-    writes, notes = _writes(stage, view, primary, step.config)
+    writes, notes = _writes(stage, view, inputs, step.config)
     with create_recording(target) as writer:
         raws = _raws(stage, view, inputs, span, thinning, reading, progress)
         bundles = read_bundles(raws, inputs, stage.reads, reading)
@@ -108,7 +109,7 @@ def _omit(omission: Omission, primary: Connection, reading: Reading) -> None:
 
 
 def _writes(
-    stage: Stage, view: View, primary: Connection, config: Any
+    stage: Stage, view: View, inputs: Mapping[Connection, Channel[Any]], config: Any
 ) -> tuple[dict[Channel[Any], Channel[Any]], tuple[str, ...]]:
     """The stage's channels and those that they become here, and what is to be said about them.
 
@@ -116,20 +117,35 @@ def _writes(
     """
     writes = {channel: channel for channel in stage.writes}
     if ANNOTATIONS in writes:
+        primary = next(connection for connection, channel in inputs.items() if channel == stage.reads[0])
         writes[ANNOTATIONS] = beside_camera_info(view, ANNOTATIONS, primary)
-    if TF in writes and getattr(config, "tf", "auto") == "auto" and _odom_has_parent(view):
-        del writes[TF]
-        return writes, (f"{ODOM_FRAME} has a parent frame already; no map -> odom transform is written",)
+    if TF in writes and getattr(config, "tf", "auto") == "auto":
+        frame = _odometry_frame(view, inputs)
+        if _has_parent(view, frame):
+            del writes[TF]
+            return writes, (f"{frame} has a parent frame already; no map -> {frame} transform is written",)
     return writes, ()
 
 
-def _odom_has_parent(view: Readable) -> bool:
+def _odometry_frame(view: Readable, inputs: Mapping[Connection, Channel[Any]]) -> str:
+    """The frame that the odometry is in, as its first message says; /odom's usual one if no message does."""
+    for raw in view.messages([connection for connection, channel in inputs.items() if channel == ODOMETRY]):
+        try:
+            odometry = odometry_from(decode(message_type(ODOMETRY, raw.connection), raw.data))
+        except MessageError:
+            continue  # reading the bundles counts it
+        if odometry is not None:
+            return odometry.frame_id.lstrip("/") or ODOM_FRAME
+    return ODOM_FRAME
+
+
+def _has_parent(view: Readable, frame: str) -> bool:
     topics = {TF.topic, TF_STATIC.topic}
     connections = [entry.connection for entry in view.channels if entry.connection.topic in topics]
-    name = ODOM_FRAME.encode() + b"\0"
+    name = frame.encode() + b"\0"
     for raw in view.messages(connections):
         if name in bytes(raw.data):  # decode only what can have it as child
             message = decode(TF.message, raw.data)
-            if any(transform.child_frame_id.lstrip("/") == ODOM_FRAME for transform in message.transforms):
+            if any(transform.child_frame_id.lstrip("/") == frame for transform in message.transforms):
                 return True
     return False
