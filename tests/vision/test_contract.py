@@ -118,8 +118,8 @@ def test_metadata_that_make_no_sense(tmp_path: Path) -> None:
         ({"names": "7"}, "names in its metadata cannot be read"),
         ({"names": "{person"}, "names in the metadata is '{person'"),
         ({**NAMES, "stride": "16"}, "stride 16"),
-        ({**NAMES, "confidence": "2"}, "confidence in the metadata"),
-        ({**NAMES, "confidence": "{'dog': 0.5}"}, "confidence in the metadata"),
+        ({**NAMES, "confidence": "2"}, "confidence in its metadata"),
+        ({**NAMES, "confidence": "{'dog': 0.5}"}, "confidence in its metadata"),
     ):
         assert said in refusal(answering(tmp_path / "m.onnx", {"output0": rows()}, metadata))
 
