@@ -146,7 +146,7 @@ class Fuser:
             place = transform_points(odom_from_base, objects.positions_xy[i][rows[0] if rows else -1])
             self._tracks[track].place_xy = place if sure else None
             if sure:
-                self._tracks[track].past.places[self._bundle] = place
+                self._tracks[track].past.stood(self._bundle, place)
 
     def _learn(self, objects: ScanObjects, detections: Detections, view: View, odometry: Array | None) -> int:
         heading_rad = 0.0 if odometry is None else float(odometry[2])

@@ -10,7 +10,7 @@ from toolkit.geometry.se2 import Array, compose, transform_points
 from toolkit.stages._fuse_sights import Sights, View
 from toolkit.stages._fuse_sizes import Size
 
-_KEPT = 40
+_KEPT, _PLACES = 40, 600
 _BEARING_RAD, _OFF_MIDDLE = 0.01, 0.2
 _ASIDE, _TALLER = 2.65, 1.25
 _FEW = 0.15
@@ -56,6 +56,12 @@ class Past:
     def note(self, box: Shown) -> None:
         """Another box; of very many the earliest are forgotten."""
         self.shown = [*self.shown[1 - _KEPT :], box]
+
+    def stood(self, bundle: int, place_xy: Array) -> None:
+        """Where it is now; of a long time the earliest places are forgotten."""
+        self.places[bundle] = place_xy
+        if len(self.places) > _PLACES:
+            del self.places[next(iter(self.places))]
 
     def unexplained(self, other: "Past", name: str, size: Size) -> int:
         """How many boxes of a class the other track cannot have been in, since it was elsewhere or had its own."""
