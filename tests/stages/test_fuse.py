@@ -157,7 +157,7 @@ def test_an_object_cut_by_the_images_edge_is_still_found() -> None:
 def test_classes_are_chosen_and_ignored() -> None:
     scenes, left_out = fused([plain()], FuseConfig(landmark_classes=("person", "suitcase")))
     assert scenes[0].classes == ("person", "suitcase")
-    assert left_out == ["detections of classes that are no landmarks, or without a box"]
+    assert left_out == ["detections of fire hydrant, which is no landmark by the settings"]
     scenes, _ = fused([plain()], FuseConfig(ignore_classes=("person",)))
     assert scenes[0].classes == ("fire hydrant", "suitcase")
 
@@ -178,7 +178,7 @@ def test_what_is_nowhere_is_left_out() -> None:
     scenes, left_out = fused([bundle(objects, given)])
     check(scenes[0], THREE)
     assert Counter(left_out) == {
-        "detections of classes that are no landmarks, or without a box": 2,
+        "detections without a class or a box": 2,
         "scan objects without a finite place": 1,
     }
     scenes, left_out = fused([bundle(scanned((), SECOND), whole)])

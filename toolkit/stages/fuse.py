@@ -1,5 +1,6 @@
 """Fuse detections in images with objects in scans to scene objects, which have a class and a place."""
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -28,7 +29,8 @@ Share = Annotated[float, Field(ge=0, le=1)]
 Positive = Annotated[float, Field(gt=0)]
 
 _UNEXPLAINED = "detections where the scan has no object that fits"
-_UNWANTED = "detections of classes that are no landmarks, or without a box"
+_UNWANTED = "detections of {}, which is no landmark by the settings"
+_NO_BOX = "detections without a class or a box"
 _UNUSABLE = "scan objects without a finite place"
 
 
@@ -87,9 +89,9 @@ def process(
         found = bundle.get(SCAN_OBJECTS)
         if found is None:
             continue
-        objects, given = _usable(found), bundle.get(DETECTIONS)
+        objects, given, left_out = _usable(found), bundle.get(DETECTIONS), Counter[str]()
         scans, images = scans + 1, images + (given is not None)
-        detections = None if given is None else _wanted(given, config)
+        detections = None if given is None else _wanted(given, config, left_out)
         if config.method == "thesis":
             scene, unexplained = fuse_in_order(objects, detections, config.image_centre_px)
         else:
@@ -100,13 +102,8 @@ def process(
             scene = _nothing(scene)
         yield Stamped(SCENE_OBJECTS, bundle.log_time_ns, scene)
         yield Stamped(SCENE_MARKERS, bundle.log_time_ns, markers_from_scene(scene))
-        left_out = {
-            _UNEXPLAINED: unexplained,
-            _UNWANTED: 0 if given is None or detections is None else len(given) - len(detections),
-            _UNUSABLE: len(found) - len(objects),
-        }
-        for reason, count in left_out.items():
-            yield from [Omission(bundle.log_time_ns, reason)] * count
+        left_out.update({_UNEXPLAINED: unexplained, _UNUSABLE: len(found) - len(objects)})
+        yield from (Omission(bundle.log_time_ns, reason) for reason in left_out.elements())
     if scans and not images:
         raise RecordingError(
             f"no {DETECTIONS.topic} lie beside any of {scans} scans; run mcap-landmarks detect first, or read others "
@@ -155,16 +152,19 @@ def _usable(objects: ScanObjects) -> ScanObjects:
     )
 
 
-def _wanted(detections: Detections, config: FuseConfig) -> Detections:
-    """The detections that are boxes of what may be a landmark."""
+def _wanted(detections: Detections, config: FuseConfig, left_out: Counter[str]) -> Detections:
+    """The detections that are boxes of what may be a landmark; the others are counted as left out."""
     classes = [options[0][0] if options else "" for options in detections.hypotheses]
     boxes = detections.boxes_xyxy
-    whole = np.flatnonzero(np.isfinite(boxes).all(axis=1) & (boxes[:, 2:] > boxes[:, :2]).all(axis=1)).tolist()
-    keep = [
-        i
-        for i, name in enumerate(classes)
-        if i in whole and name and name not in config.ignore_classes and name in (config.landmark_classes or classes)
-    ]
+    whole = np.isfinite(boxes).all(axis=1) & (boxes[:, 2:] > boxes[:, :2]).all(axis=1)
+    keep = []
+    for i, name in enumerate(classes):
+        if not (name and whole[i]):
+            left_out[_NO_BOX] += 1
+        elif name in config.ignore_classes or name not in (config.landmark_classes or classes):
+            left_out[_UNWANTED.format(name)] += 1
+        else:
+            keep.append(i)
     return Detections(
         detections.stamp_ns,
         detections.frame_id,

@@ -200,7 +200,7 @@ def _thresholds(session: Session, names: tuple[str, ...]) -> dict[str, float]:
         name in names and isinstance(value, int | float) and 0 <= value <= 1 for name, value in by_class.items()
     ):
         raise ModelError(
-            f"{session.path}: confidence in its metadata is neither 0 to 1 nor such numbers by the names of its classes "
+            f"{session.path}: confidence in its metadata is neither 0 to 1 nor such numbers by its own class names "
             f"({', '.join(names)}); rename its keys too, or take it out of the metadata and set detect.confidence"
         )
     return {name: float(value) for name, value in by_class.items()}
