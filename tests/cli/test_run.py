@@ -1,7 +1,6 @@
 """Stages from the command line: what ran, what was reused, what an interruption leaves."""
 
 import json
-import os
 import signal
 from collections.abc import Mapping
 from pathlib import Path
@@ -133,10 +132,11 @@ def test_an_interruption_leaves_finished_stages(
     def interrupting(message: Message) -> Mapping[str, int]:
         seen[0] += 1
         if seen[0] == 5 * COUNT - 2:  # the results of cluster, two for every image of detect, some of fuse
-            os.kill(os.getpid(), signal.SIGINT)
+            signal.raise_signal(signal.SIGINT)
         return tally(message)
 
     monkeypatch.setattr(step, "tally", interrupting)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts background jobs without it
     words = ("run", here / "log.mcap", "--stages", FRONT, "-o", out)
     assert call(*words, "--model", here / "model.onnx") == 130
     assert not out.exists()
