@@ -112,6 +112,16 @@ def test_a_map_from_pixels(here: Path, capsys: pytest.CaptureFixture[str], monke
     assert not [path.name for path in here.iterdir() if "parts" in path.name]
 
 
+def test_a_map_tells_every_time_what_was_left_out(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("map", here / "log.mcap", "--map", here / "new.db", "--model", here / "model.onnx", "--image-rate", "2.5")
+    notes = []
+    for _ in range(2):
+        assert call(*words) == 0
+        notes.append([line for line in capsys.readouterr().err.splitlines() if line.startswith("note: ")])
+    assert any("images left out by --image-rate (detect)" in line for line in notes[0])
+    assert notes[0] == notes[1]
+
+
 def test_fewer_images(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ("run", here / "log.mcap", "--stages", "detect", "-o", here / "out.mcap")
     found = document(capsys, here, *words, "--image-rate", "2.5")

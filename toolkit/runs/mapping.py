@@ -39,7 +39,7 @@ from toolkit.stage import Reduction, Stamped
 from toolkit.stages import find_stage
 
 _LOGS = "logs"
-"""The manifest's option with what came of each log."""
+"""The manifest's option with what came of each log: of the stages before, then of the map."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,18 +162,13 @@ def _found(task: MapTask, plans: Sequence[_LogPlan], record: StageRecord, parts:
             with open_bench(entry.request, parts, output) as bench:
                 if bench.find(_share(entry, record)) is None:
                     return None
-    outcomes = [Outcome.of(outcome) for outcome in json.loads(entries["options"])[_LOGS]]
     reason = "the map was made from the same logs, files and settings"
-    logs = tuple(
-        MappedLog(
-            entry.request.recording,
-            entry.fingerprint,
-            tuple(StageRun(step.stage.name, "reused", reason, Outcome()) for step in entry.steps),
-            outcome,
-        )
-        for entry, outcome in zip(plans, outcomes, strict=True)
-    )
-    return MapRun(read_map(task.database), StageRun(record.stage, "reused", reason, Outcome()), logs)
+    logs = []
+    for entry, (*before, own) in zip(plans, json.loads(entries["options"])[_LOGS], strict=True):
+        runs = zip(entry.steps, before, strict=True)
+        stages = tuple(StageRun(step.stage.name, "reused", reason, Outcome.of(outcome)) for step, outcome in runs)
+        logs.append(MappedLog(entry.request.recording, entry.fingerprint, stages, Outcome.of(own)))
+    return MapRun(read_map(task.database), StageRun(record.stage, "reused", reason, Outcome()), tuple(logs))
 
 
 def _why(entries: Mapping[str, str], record: StageRecord) -> str:
@@ -212,7 +207,7 @@ def _build(
     for entry, trajectory in zip(plans, trajectories, strict=True):
         if entry.request.recording in task.outputs:
             _write_part(_share(entry, record), landmark_map, trajectory, parts)
-    outcomes = {_LOGS: [log.outcome.entry() for log in logs]}
+    outcomes = {_LOGS: [[*(run.outcome.entry() for run in log.stages), log.outcome.entry()] for log in logs]}
     fingerprints = tuple(log.fingerprint for log in logs)
     manifest = Manifest("map", inputs=fingerprints, options=outcomes, stages=(record,))
     write_map(task.database, landmark_map, manifest.entries())
