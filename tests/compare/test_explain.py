@@ -79,3 +79,10 @@ def test_few_objects_and_weak_geometry() -> None:
     lone = replace(situation(LandmarkMatch(0, "base", Status.TOO_FEW_OBJECTS)), scene=scene(["person"], [[1.0, 0]], 0))
     assert failing(lone) == ["objects"]
     assert conditions_of(Situation(0, None, None), ()) == ()
+
+
+def test_of_a_position_from_ranges_alone_no_heading_is_asked() -> None:
+    match = LandmarkMatch(0, "base", Status.LOCALIZED, ("a", "b", "c"), ("l0", "l1", "l2"), np.zeros(3))
+    narrow = replace(situation(match), limits=Limits(max_sigma_deg=1e-3))
+    assert failing(narrow) == []
+    assert failing(replace(narrow, covariance=np.diag([1e-4, 1e-4, 1e-2]))) == ["heading"]

@@ -178,9 +178,10 @@ def conditions_of(situation: Situation, places: tuple[Place, ...]) -> tuple[Cond
         found.append(_at_least("matched", float(len(best.rows)), least, f"of {len(scene)} objects are matched"))
     covariance = situation.covariance
     sigma_m = best.sigma_m if covariance is None else float(position_sigma(covariance))
-    sigma_deg = best.sigma_deg if covariance is None else float(np.degrees(np.sqrt(covariance[2, 2])))
     found.append(_at_most("position", sigma_m, limits.max_sigma_m, "m standard deviation of the position"))
-    found.append(_at_most("heading", sigma_deg, limits.max_sigma_deg, "degrees standard deviation of the heading"))
+    if match.status != Status.LOCALIZED or covariance is not None:  # else a position without heading, of ranges alone
+        sigma_deg = best.sigma_deg if covariance is None else float(np.degrees(np.sqrt(covariance[2, 2])))
+        found.append(_at_most("heading", sigma_deg, limits.max_sigma_deg, "degrees standard deviation of the heading"))
     return tuple(found)
 
 
