@@ -205,7 +205,9 @@ def _draw_estimate(axes: Axes, run: Run, colour: str, *, named: bool) -> None:
         return
     name = f"{run.name}: " if named else ""
     if run.continuous:
-        axes.plot(*breaks(run.estimate).T, color=colour, linewidth=0.9, label=f"{name}estimated path", zorder=5)
+        path, label = breaks(run.estimate), f"{name}estimated path"
+        starts = [0, *(np.flatnonzero(np.isnan(path[:, 0])) + 1).tolist()] if len(path) else []
+        axes.plot(*path.T, ".-", color=colour, linewidth=0.9, markersize=3.5, markevery=starts, label=label, zorder=5)
         return
     found, truth = run.scored.estimate[:, :2], run.scored.reference[:, :2]
     axes.add_collection(LineCollection(list(np.stack([truth, found], axis=1)), colors=_ERROR, linewidths=0.9, zorder=4))
