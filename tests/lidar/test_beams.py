@@ -126,6 +126,16 @@ def test_a_slice_of_a_cloud_is_the_nearest_return_of_each_direction() -> None:
     np.testing.assert_array_equal(nothing.origins_xy, np.broadcast_to(origin, (63, 2)))
 
 
+def test_what_a_sparse_cloud_leaves_out_is_not_taken_for_free() -> None:
+    distances = ranges(THINGS)
+    seen = np.isfinite(distances)
+    points = distances[seen, None] * np.column_stack([np.cos(ANGLES_RAD[seen]), np.sin(ANGLES_RAD[seen])])
+    beams = slice_beams(points, np.zeros(2), np.deg2rad(0.25))
+    expected = sweep(ANGLES_RAD, distances, np.eye(4))
+    np.testing.assert_allclose(hits(beams), hits(expected), atol=1e-9)
+    np.testing.assert_allclose(np.diff(np.sort(beams.angles_rad)), expected.spacing_rad[0], rtol=0.01)
+
+
 def test_a_slice_of_a_cloud_leaves_from_where_the_lidar_was() -> None:
     """The same points with their times, and the beams that a scan with the same times has."""
     then = exp(np.linspace(-0.1, 0.1, len(ANGLES_RAD))[:, None] * np.array([1.0, 0.0, 2.0]))

@@ -3,8 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from toolkit.geometry.angles import wrap
 from toolkit.geometry.se2 import Array, transform_points
 from toolkit.lidar.beams import Beams, Limits, sweep
+
+_ON_ONE_M, _WIDEST_RAD = 0.5, 0.1
+"""Neighbours so near to each other are on one thing, and tell how far apart beams are."""
 
 
 def in_slice(points_m: Array, heights_m: tuple[float, float]) -> NDArray[np.bool_]:
@@ -23,10 +27,10 @@ def slice_beams(
 ) -> Beams:
     """The nearest return in each direction, of the points (N, 2) of a slice in the base frame.
 
-    There is one beam per `beam_rad` around the LiDAR's place `origin_xy` (2,): towards the nearest of its points, or
-    ahead through its middle where it has none. `base_from_then` (N, 3) says where the base was at the time of each
-    point, in the base frame of the moment that is asked for; a beam without a point leaves from where the one beside
-    it does.
+    Of the points in each `beam_rad` around the LiDAR's place `origin_xy` (2,) the nearest is where a beam ended. In
+    between are beams that met nothing, as far apart as the cloud's own: what a sparse one leaves out need not be free.
+    `base_from_then` (N, 3) says where the base was at the time of each point, in the base frame of the moment that is
+    asked for; a beam without a point leaves from where the one beside it does.
     """
     origins = np.broadcast_to(origin_xy, points_xy.shape)
     if base_from_then is not None:
@@ -40,19 +44,31 @@ def slice_beams(
     bins = np.minimum(((angles + np.pi) * (count / (2 * np.pi))).astype(np.int64), count - 1)
     order = np.lexsort((ranges, bins))
     first = order[np.unique(bins[order], return_index=True)[1]]
-    all_ranges = np.full(count, np.inf)
-    all_angles = (np.arange(count, dtype=np.float64) + 0.5) * (2 * np.pi / count) - np.pi
-    all_ranges[bins[first]], all_angles[bins[first]] = ranges[first], angles[first]
-    # The place where each beam begins stands for the mounting, which differs from beam to beam.
-    places = np.zeros((count, 3))
-    places[:, :2] = origins[first[_nearest(bins[first], count)]] if len(first) else origin_xy
+    if not len(first):
+        angles = (np.arange(count, dtype=np.float64) + 0.5) * (2 * np.pi / count) - np.pi
+        return sweep(angles, np.full(count, np.inf), np.eye(4), _places(np.broadcast_to(origin_xy, (count, 2))), limits)
+    ranges, angles, origins = ranges[first], angles[first], origins[first]
+    free, beside = _free(ranges, angles, beam_rad)
+    all_angles = np.concatenate([angles, free])
+    all_ranges = np.concatenate([ranges, np.full(len(free), np.inf)])
+    places = _places(np.concatenate([origins, origins[beside]]))
     return sweep(all_angles, all_ranges, np.eye(4), places, limits)
 
 
-def _nearest(taken: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Which of the places that are taken (K,), rising, is nearest to each of `count` around a circle."""
-    places = np.arange(count)
-    after = np.searchsorted(taken, places)
-    ahead = (taken[after % len(taken)] - places) % count
-    behind = (places - taken[after - 1]) % count
-    return np.where(ahead <= behind, after % len(taken), after - 1)
+def _places(origins_xy: Array) -> Array:
+    """Where beams begin as places of the base (N, 3): they stand for the mounting, which differs from beam to beam."""
+    return np.column_stack([origins_xy, np.zeros(len(origins_xy))])
+
+
+def _free(ranges: Array, angles: Array, beam_rad: float) -> tuple[Array, NDArray[np.int64]]:
+    """Directions (M,) of beams that met nothing between those that ended at K rising angles; which is beside each."""
+    gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+    aside = np.hypot(np.roll(ranges, -1) - ranges, gaps * ranges)  # nearly the distance of near points
+    on_one = gaps[(aside < _ON_ONE_M) & (gaps < _WIDEST_RAD)]
+    usual = max(beam_rad, float(np.median(on_one))) if len(on_one) else beam_rad
+    missing = np.maximum(np.round(gaps / usual).astype(np.int64) - 1, 0)
+    before = np.repeat(np.arange(len(gaps)), missing)
+    step = np.arange(len(before)) - np.repeat(np.cumsum(missing) - missing, missing) + 1
+    share = step / (missing[before] + 1)
+    beside = np.where(share <= 0.5, before, (before + 1) % len(gaps))
+    return wrap(angles[before] + share * gaps[before]), beside

@@ -123,7 +123,7 @@ class ClusterConfig:
     distances from the LiDAR, bearings in the base frame, counter-clockwise from, to; unset, all that the scan gives.
     `gate_m`: how far an object may be from where it was last, through odometry, and keep its id, which is kept for
     `memory_s` without being seen. Of a point cloud the points between the heights `slice_m` in the base frame count,
-    the nearest one in every `slice_beam_deg`.
+    the nearest one in every `slice_beam_deg`, or as finely as the cloud goes if that is coarser.
 
     The thesis (Algorithm 2) has 0 to 30 and 330 to 360 degrees, 0.5 to 15 m, and the middle beam of every run of hits.
     """
