@@ -156,10 +156,10 @@ def _wanted(detections: Detections, config: FuseConfig, left_out: Counter[str]) 
     """The detections that are boxes of what may be a landmark; the others are counted as left out."""
     classes = [options[0][0] if options else "" for options in detections.hypotheses]
     boxes = detections.boxes_xyxy
-    whole = np.isfinite(boxes).all(axis=1) & (boxes[:, 2:] > boxes[:, :2]).all(axis=1)
+    whole = np.flatnonzero(np.isfinite(boxes).all(axis=1) & (boxes[:, 2:] > boxes[:, :2]).all(axis=1)).tolist()
     keep = []
     for i, name in enumerate(classes):
-        if not (name and whole[i]):
+        if not (name and i in whole):
             left_out[_NO_BOX] += 1
         elif name in config.ignore_classes or name not in (config.landmark_classes or classes):
             left_out[_UNWANTED.format(name)] += 1
