@@ -33,15 +33,14 @@ class Settings(Protocol):
     def accidental(self) -> float: ...
 
 
-def by_bearings(given: Given, mask: Bools) -> tuple[PoseSolutions, Array]:
-    """Poses from the bearings that `mask` (B, K) leaves, and the distances (B, K) that they mean."""
+def by_bearings(given: Given, mask: Bools) -> PoseSolutions:
+    """Poses from the bearings that `mask` (B, K) leaves."""
     variance = given.covariance[..., 1, 1]
     first = solve_bearings(given.landmarks_xy, given.bearing_rad, variance, mask=mask)
-    distance_m = _distances(first.map_from_base, given)
+    distance_m = distances(first.map_from_base, given)
     # Seen from where the robot is, the landmark's own error is an angle.
     variance = variance + _landmark_variance(given) / np.maximum(distance_m, 1e-9) ** 2
-    solved = solve_bearings(given.landmarks_xy, given.bearing_rad, variance, mask=mask)
-    return solved, _distances(solved.map_from_base, given)
+    return solve_bearings(given.landmarks_xy, given.bearing_rad, variance, mask=mask)
 
 
 def locate_by_ranges(
@@ -69,7 +68,7 @@ def _judge(
     elif apart and odds[1] > settings.accidental:
         status = Status.AMBIGUOUS
     k = len(problem.objects)
-    off_m = np.abs(_distances(position[None], given.pick(np.array([i])))[0, :k] - given.range_m[i, :k])
+    off_m = np.abs(distances(position[None], given.pick(np.array([i])))[0, :k] - given.range_m[i, :k])
     shown = both if status == Status.AMBIGUOUS else both[:0]
     match = LandmarkMatch(
         problem.scene.stamp_ns,
@@ -87,7 +86,8 @@ def _judge(
     return Match(match, np.array([*position, 0.0])) if status == Status.LOCALIZED else Match(match)
 
 
-def _distances(poses: Array, given: Given) -> Array:
+def distances(poses: Array, given: Given) -> Array:
+    """Distances (B, K) to the landmarks from poses (B, 3) or positions (B, 2)."""
     distance_m: Array = np.linalg.norm(given.landmarks_xy - poses[:, None, :2], axis=-1)
     return distance_m
 

@@ -9,7 +9,7 @@ from scipy.special import chdtri
 
 from toolkit.estimation.batch import PoseSolutions
 from toolkit.estimation.calibration import SensorModel, calibrate
-from toolkit.estimation.pose import solve_poses
+from toolkit.estimation.pose import position_sigma, solve_poses
 from toolkit.geometry.se2 import Array, transform_points
 from toolkit.landmarks.model import LandmarkMap
 from toolkit.landmarks.plausible import check_scale
@@ -17,29 +17,20 @@ from toolkit.landmarks.unique import pairs_by_class, unique_classes
 from toolkit.landmarks.verdicts import Match
 from toolkit.messages.match import LandmarkMatch, Status
 from toolkit.messages.scene import SceneObjects
-from toolkit.stages._localize_given import Bools, Given, Problem, Rows
-from toolkit.stages._localize_one_kind import LEAST, by_bearings, locate_by_ranges
+from toolkit.stages._localize_given import Bools, Given, Problem, Rows, Sigmas
+from toolkit.stages._localize_one_kind import LEAST, by_bearings, distances, locate_by_ranges
+from toolkit.stages._localize_one_kind import Settings as OneKindSettings
 
 
-class Settings(Protocol):
+class Settings(Sigmas, OneKindSettings, Protocol):
     """What of the stage's configuration is used here."""
 
     @property
-    def max_sigma_m(self) -> float: ...
-    @property
     def max_sigma_deg(self) -> float: ...
-    @property
-    def range_sigma_m(self) -> float: ...
-    @property
-    def bearing_sigma_rad(self) -> float: ...
     @property
     def robust_dof(self) -> float: ...
     @property
-    def consistency(self) -> float: ...
-    @property
     def calibrate(self) -> bool: ...
-    @property
-    def accidental(self) -> float: ...
 
 
 class UniqueLocator:
@@ -81,8 +72,8 @@ class UniqueLocator:
         return [found[i] for i in range(len(problems))]
 
     def _by_bearings(self, problems: Sequence[Problem], given: Given) -> list[Match]:
-        solved, mask, fits = _fitting(lambda mask: by_bearings(given, mask)[0], given.mask, LEAST, self._settings)
-        distance_m = by_bearings(given, mask)[1]
+        solved, mask, fits = _fitting(lambda mask: by_bearings(given, mask), given.mask, LEAST, self._settings)
+        distance_m = distances(solved.map_from_base, given)
         return [
             _judge(problem, i, solved, mask[i], distance_m[i], bool(fits[i]), self._map, self._settings)
             for i, problem in enumerate(problems)
@@ -172,7 +163,7 @@ def _judge(
     objects, landmarks = problem.objects[kept], problem.landmarks[kept]
     pose, covariance = solutions.map_from_base[i], solutions.covariance[i]
     finite = np.isfinite(covariance).all()
-    sigma_m = float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[-1])) if finite else np.inf
+    sigma_m = float(position_sigma(covariance)) if finite else np.inf
     sigma_deg = float(np.degrees(np.sqrt(covariance[2, 2]))) if finite else np.inf
     status = Status.LOCALIZED
     if not fits:
