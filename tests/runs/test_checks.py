@@ -9,7 +9,8 @@ import pytest
 
 from tests.cli.logs import write
 from tests.runs.chain import STEP_NS, raw_messages
-from toolkit.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY, SCAN, TF_STATIC
+from toolkit.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY, SCAN, SCENE_OBJECTS, TF_STATIC
+from toolkit.messages.scene import SceneObjects
 from toolkit.recording.writer import create_recording
 from toolkit.runs.bench import unwatched
 from toolkit.runs.checks import Finding
@@ -126,6 +127,18 @@ def test_what_is_planted_is_found_and_only_that(tmp_path: Path, name: str) -> No
         texts = [finding.text for finding in found if (finding.check, finding.topic) == (check, topic)]
         assert any(words in text for text in texts), texts
     assert all(finding.remedy for finding in found)
+
+
+@pytest.mark.parametrize(("topic", "said"), [(SCENE_OBJECTS.topic, []), ("/tags", ["/tags"])])
+def test_results_have_the_stamps_of_what_they_were_made_from(tmp_path: Path, topic: str, said: list[str]) -> None:
+    def logged_late(stamped: Stamped) -> Stamped:
+        if stamped.channel != SCAN:
+            return stamped
+        nothing = (), (), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0)
+        scene = SceneObjects(stamped.log_time_ns, "base_footprint", *nothing)
+        return Stamped(Channel(topic, SceneObjects), stamped.log_time_ns + SECOND, scene)
+
+    assert [finding.topic for finding in findings(tmp_path, logged_late) if finding.check == "clock"] == said
 
 
 def test_problems_come_first(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from toolkit.channels import RESULTS
 from toolkit.geometry.frames import REMEDY
 from toolkit.recording.association import BESIDE_NS, WINDOW_NS
 from toolkit.runs.survey import Returns, Sensor, Survey, connected
@@ -120,7 +121,8 @@ def _stamps(found: Survey) -> Iterator[Finding]:
 
 
 def _clocks(found: Survey) -> Iterator[Finding]:
-    delays = {sensor.topic: delay for sensor in found.sensors if (delay := _delay_ns(sensor)) is not None}
+    sensed = [sensor for sensor in found.sensors if not sensor.topic.startswith(RESULTS)]  # ours have others' stamps
+    delays = {sensor.topic: delay for sensor in sensed if (delay := _delay_ns(sensor)) is not None}
     references = [sensor.topic for role in ("odometry", "scan", "image") for sensor in found.of(role)]
     reference = next((topic for topic in references if topic in delays), None)
     for topic, delay_ns in delays.items():
