@@ -8,9 +8,9 @@ import os
 import sys
 from pathlib import Path
 
-from generator.checks import stage
-from generator.loading import load_scenario
-from generator.record import record
+from mcap_landmarks_generator.checks import stage
+from mcap_landmarks_generator.loading import load_scenario
+from mcap_landmarks_generator.record import record
 
 HERE = Path(__file__).resolve().parent
 

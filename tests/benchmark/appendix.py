@@ -5,22 +5,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from mcap_landmarks.estimation.thesis import solve_position
+from mcap_landmarks.geometry.se2 import Array, inverse, transform_points
+from mcap_landmarks.lidar import shapes
+from mcap_landmarks.lidar.beams import sweep
+from mcap_landmarks.lidar.objects import Hypotheses
+from mcap_landmarks.localization.index import MapIndex
+from mcap_landmarks.localization.matching import MatchConfig, Matcher
+from mcap_landmarks.maps.exchange_thesis import parse_map, parse_results
+from mcap_landmarks.maps.model import LandmarkMap
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.stages._cluster_config import ClusterConfig
+from mcap_landmarks.stages.cluster import cluster, shapes_of
 from numpy.typing import NDArray
 
 from tests.benchmark.rows import Row
 from tests.lidar.scans import ANGLES_RAD, Thing, box, disc, ranges
-from toolkit.estimation.thesis import solve_position
-from toolkit.geometry.se2 import Array, inverse, transform_points
-from toolkit.landmarks.exchange_thesis import parse_map, parse_results
-from toolkit.landmarks.index import MapIndex
-from toolkit.landmarks.matching import MatchConfig, Matcher
-from toolkit.landmarks.model import LandmarkMap
-from toolkit.lidar import shapes
-from toolkit.lidar.beams import sweep
-from toolkit.lidar.objects import Hypotheses
-from toolkit.messages.scene import SceneObjects
-from toolkit.stages._cluster_config import ClusterConfig
-from toolkit.stages.cluster import cluster, shapes_of
 
 _TEXTS = Path(__file__).resolve().parents[1] / "data"
 _SAME_M, _STATIC = 0.6, 10

@@ -4,22 +4,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from mcap_landmarks.geometry.angles import quaternion_from_yaw
+from mcap_landmarks.geometry.se2 import Array, inverse, transform_points
+from mcap_landmarks.lidar import thesis
+from mcap_landmarks.lidar.beams import echoes, sweep
+from mcap_landmarks.lidar.objects import Hypotheses
+from mcap_landmarks.stages._cluster_config import ClusterConfig
+from mcap_landmarks.stages.cluster import cluster, shapes_of
+from mcap_landmarks_generator.assets import catalog
+from mcap_landmarks_generator.history import History
+from mcap_landmarks_generator.layout import PlacedObject
+from mcap_landmarks_generator.lidar import ANGLE_MAX_RAD, cast, noisy
+from mcap_landmarks_generator.robot import SCAN_IN_BASE_M, RobotState
+from mcap_landmarks_generator.sensor_specs import LidarSpec
+from mcap_landmarks_generator.world import World
 from numpy.typing import NDArray
-
-from generator.assets import catalog
-from generator.history import History
-from generator.layout import PlacedObject
-from generator.lidar import ANGLE_MAX_RAD, cast, noisy
-from generator.robot import SCAN_IN_BASE_M, RobotState
-from generator.sensor_specs import LidarSpec
-from generator.world import World
-from toolkit.geometry.angles import quaternion_from_yaw
-from toolkit.geometry.se2 import Array, inverse, transform_points
-from toolkit.lidar import thesis
-from toolkit.lidar.beams import echoes, sweep
-from toolkit.lidar.objects import Hypotheses
-from toolkit.stages._cluster_config import ClusterConfig
-from toolkit.stages.cluster import cluster, shapes_of
 
 RANGES_M = (2.0, 10.0)
 FARTHEST_M = 15.0

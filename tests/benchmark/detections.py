@@ -6,28 +6,28 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from mcap_landmarks import resources
+from mcap_landmarks.channels import DETECTIONS, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
+from mcap_landmarks.messages.codec import decode as decode_message
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.runs.pipeline import run_stages
+from mcap_landmarks.runs.plan import Request
+from mcap_landmarks.stages.detect import DetectConfig, decode, input_size, thresholds
+from mcap_landmarks.vision.contract import read_contract
+from mcap_landmarks.vision.letterbox import fit, tensor
+from mcap_landmarks.vision.session import open_session
+from mcap_landmarks_generator.assets.catalog import COCO_ID, HELD_OUT_SEEDS
+from mcap_landmarks_generator.camera import Intrinsics
+from mcap_landmarks_generator.checks import stage
+from mcap_landmarks_generator.loading import load_scenario
+from mcap_landmarks_generator.record import record
+from mcap_landmarks_generator.sensor_specs import CameraSpec
+from mcap_landmarks_generator.training.pictures import Labels, Picture, render
+from mcap_landmarks_generator.training.scoring import Found, Scored, iou, joined, score
+from mcap_landmarks_generator.training.worlds import THESIS_CLASSES, Kind, judged, scene
 from numpy.typing import NDArray
 
-from generator.assets.catalog import COCO_ID, HELD_OUT_SEEDS
-from generator.camera import Intrinsics
-from generator.checks import stage
-from generator.loading import load_scenario
-from generator.record import record
-from generator.sensor_specs import CameraSpec
-from generator.training.pictures import Labels, Picture, render
-from generator.training.scoring import Found, Scored, iou, joined, score
-from generator.training.worlds import THESIS_CLASSES, Kind, judged, scene
 from tests.benchmark.rows import Row
-from toolkit import resources
-from toolkit.channels import DETECTIONS, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
-from toolkit.messages.codec import decode as decode_message
-from toolkit.recording.reader import open_recording
-from toolkit.runs.pipeline import run_stages
-from toolkit.runs.plan import Request
-from toolkit.stages.detect import DetectConfig, decode, input_size, thresholds
-from toolkit.vision.contract import read_contract
-from toolkit.vision.letterbox import fit, tensor
-from toolkit.vision.session import open_session
 
 SEED = 10_000
 VIEWS = 8

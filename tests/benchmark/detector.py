@@ -10,21 +10,21 @@ from typing import Any
 
 import numpy as np
 import onnxruntime
+from mcap_landmarks import resources
+from mcap_landmarks.channels import CAMERA_IMAGE
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.images import CompressedImage
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.runs.pipeline import run_stages
+from mcap_landmarks.runs.plan import Request
+from mcap_landmarks.vision.letterbox import fit, tensor
+from mcap_landmarks.vision.pixels import rgb_from_message
+from mcap_landmarks.vision.session import open_session
 from numpy.typing import NDArray
 
 from tests.benchmark import detections
 from tests.benchmark.rows import Row, main
 from tests.vision.networks import SIZES, Export, yolov5
-from toolkit import resources
-from toolkit.channels import CAMERA_IMAGE
-from toolkit.messages.codec import decode
-from toolkit.messages.images import CompressedImage
-from toolkit.recording.reader import open_recording
-from toolkit.runs.pipeline import run_stages
-from toolkit.runs.plan import Request
-from toolkit.vision.letterbox import fit, tensor
-from toolkit.vision.pixels import rgb_from_message
-from toolkit.vision.session import open_session
 
 NAMES = [f"class {i}" for i in range(80)]
 INPUT_PX = (480, 640)

@@ -12,21 +12,21 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from mcap_landmarks import channels
+from mcap_landmarks.messages.match import LandmarkMatch, Status
+from mcap_landmarks.messages.poses import PoseStamped, PoseWithCovarianceStamped
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.stage import Stamped
 
 from tests.benchmark.rows import Row, main
-from toolkit import channels
-from toolkit.messages.match import LandmarkMatch, Status
-from toolkit.messages.poses import PoseStamped, PoseWithCovarianceStamped
-from toolkit.messages.scene import SceneObjects
-from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.recording.writer import create_recording
-from toolkit.stage import Stamped
 
 BUNDLES, STEP_NS, START_NS = 36_000, 10**8, 1_700_000_000 * 10**9
 OBJECTS, LANDMARKS = 4, 60
 _CHILD = """
 import json, resource, sys, time
-from toolkit.cli.main import run
+from mcap_landmarks.cli.main import run
 start = time.perf_counter()
 try:
     run(["diff", *sys.argv[1:], "--json"])

@@ -7,11 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from generator.robot import SCAN_IN_BASE_M
-from tests.benchmark.rows import Row
-from tests.benchmark.thesis_runs import call
-from toolkit.channels import (
+from mcap_landmarks.channels import (
     CAMERA_IMAGE,
     DETECTIONS,
     MATCH,
@@ -21,14 +17,18 @@ from toolkit.channels import (
     TRUTH_OBJECTS,
     TRUTH_POSE,
 )
-from toolkit.geometry.se2 import Array, interpolate, inverse, transform_points
-from toolkit.messages.codec import M, decode
-from toolkit.messages.detections import Detections
-from toolkit.messages.match import Status
-from toolkit.messages.scene import SceneObjects
-from toolkit.recording.reader import Recording, open_recording
-from toolkit.recording.writer import create_recording
-from toolkit.stage import Channel, Stamped
+from mcap_landmarks.geometry.se2 import Array, interpolate, inverse, transform_points
+from mcap_landmarks.messages.codec import M, decode
+from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.match import Status
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.recording.reader import Recording, open_recording
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.stage import Channel, Stamped
+from mcap_landmarks_generator.robot import SCAN_IN_BASE_M
+
+from tests.benchmark.rows import Row
+from tests.benchmark.thesis_runs import call
 
 SEED = 10_000
 WIDTH_PX, HEIGHT_PX = 640, 480

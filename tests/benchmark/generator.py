@@ -15,17 +15,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mcap_landmarks_generator.assets.backdrop import Backdrop
+from mcap_landmarks_generator.camera import ImageJob
+from mcap_landmarks_generator.checks import Staged, stage
+from mcap_landmarks_generator.drawing import Drawing
+from mcap_landmarks_generator.loading import load_scenario
+from mcap_landmarks_generator.optics import Optics
+from mcap_landmarks_generator.record import record
+from mcap_landmarks_generator.renderer import Renderer
+from mcap_landmarks_generator.rendering import Photographer
+from mcap_landmarks_generator.simulation import Simulation
 
-from generator.assets.backdrop import Backdrop
-from generator.camera import ImageJob
-from generator.checks import Staged, stage
-from generator.drawing import Drawing
-from generator.loading import load_scenario
-from generator.optics import Optics
-from generator.record import record
-from generator.renderer import Renderer
-from generator.rendering import Photographer
-from generator.simulation import Simulation
 from tests.benchmark.rows import Row, main
 
 WORKERS = 2
@@ -95,7 +95,7 @@ def memory(folder: Path, quick: bool) -> Iterator[Row]:
 
 
 def _peak_mib(scenario: Path, laps: int, output: Path) -> float:
-    command = [sys.executable, "-c", "from toolkit.cli.main import run; run()", "generate", str(scenario)]
+    command = [sys.executable, "-c", "from mcap_landmarks.cli.main import run; run()", "generate", str(scenario)]
     options = ["-o", str(output), "--workers", "1", "--set", f"trajectory.laps={laps}"]
     with subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as child:
         _, status, usage = os.wait4(child.pid, 0)

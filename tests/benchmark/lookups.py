@@ -11,12 +11,12 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+from mcap_landmarks.localization.index import MapIndex
+from mcap_landmarks.localization.matching import MatchConfig, Matcher, block_diagonal
+from mcap_landmarks.maps.database import read_map, read_neighbours, write_map
 
 from tests.benchmark.rows import Row
 from tests.benchmark.worlds import Sensor, World, pose_looking_at, random_world, scene
-from toolkit.landmarks.database import read_map, read_neighbours, write_map
-from toolkit.landmarks.index import MapIndex
-from toolkit.landmarks.matching import MatchConfig, Matcher, block_diagonal
 
 _BATCH, _ROUNDS = 5000, 5
 _LARGE = 200_000

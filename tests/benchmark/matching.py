@@ -4,6 +4,8 @@ import sys
 from collections.abc import Iterator
 
 import numpy as np
+from mcap_landmarks.localization.index import MapIndex
+from mcap_landmarks.localization.matching import MatchConfig, Matcher
 
 from tests.benchmark.lookups import lookup_rows
 from tests.benchmark.modulo import modulo_rows
@@ -12,8 +14,6 @@ from tests.benchmark.rows import Row, main
 from tests.benchmark.stretches import CAMERA, Conditions, in_parallel, judged, stretch
 from tests.benchmark.worlds import Sensor, World, appendix_c, pose_looking_at, random_world, scene
 from tests.shared import data_folder
-from toolkit.landmarks.index import MapIndex
-from toolkit.landmarks.matching import MatchConfig, Matcher
 
 # Development uses seeds below 10,000.
 _SEED = 10_000

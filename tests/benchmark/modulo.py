@@ -8,22 +8,22 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from mcap_landmarks.channels import POSE, SCENE_OBJECTS
+from mcap_landmarks.cli.main import run
+from mcap_landmarks.evaluation.read import read_reference
+from mcap_landmarks.evaluation.trajectory import Trajectory, interpolated
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.inspection.topic_roles import Choice
+from mcap_landmarks.maps.database import read_map, write_map
+from mcap_landmarks.messages.poses import PoseStamped
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.runs.bundles import Reading, inputs_of, read_bundles
+from mcap_landmarks.stage import Bundle, Stamped
+from mcap_landmarks.stages.localize import STAGE, LocalizeConfig, process
 
 from tests.benchmark.rows import Row
 from tests.benchmark.stretches import in_parallel
-from toolkit.channels import POSE, SCENE_OBJECTS
-from toolkit.cli.main import run
-from toolkit.compare.read import read_reference
-from toolkit.compare.trajectory import Trajectory, interpolated
-from toolkit.geometry.se2 import Array
-from toolkit.landmarks.database import read_map, write_map
-from toolkit.messages.poses import PoseStamped
-from toolkit.messages.scene import SceneObjects
-from toolkit.recording.reader import open_recording
-from toolkit.runs.bundles import Reading, inputs_of, read_bundles
-from toolkit.runs.inputs import Choice
-from toolkit.stage import Bundle, Stamped
-from toolkit.stages.localize import STAGE, LocalizeConfig, process
 
 _MODULO = 3
 _GAP_NS = 10**9

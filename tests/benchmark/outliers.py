@@ -3,12 +3,12 @@
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from mcap_landmarks.localization.index import MapIndex
+from mcap_landmarks.localization.matching import MatchConfig, Matcher
 
 from tests.benchmark.rows import Row
 from tests.benchmark.stretches import CAMERA, Conditions, in_parallel, judged, stretch
 from tests.benchmark.worlds import Sensor, World, appendix_c, pose_looking_at, random_world, scene
-from toolkit.landmarks.index import MapIndex
-from toolkit.landmarks.matching import MatchConfig, Matcher
 
 _MISCLASSIFIED, _SPURIOUS = 0.2, 2
 _GROUPS = 200

@@ -5,11 +5,11 @@ import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from mcap_landmarks.estimation.pose import solve_poses
+from mcap_landmarks.estimation.thesis import solve_position
 
 from tests.benchmark.rows import Row, main
 from tests.estimation.worlds import Snapshots, nees, pose_errors, thesis_like
-from toolkit.estimation.pose import solve_poses
-from toolkit.estimation.thesis import solve_position
 
 SIGMAS_RANGE_M = (0.01, 0.02, 0.05)
 SIGMAS_BEARING_DEG = (0.1, 0.3)

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from mcap_landmarks.estimation.pose import solve_poses
+from mcap_landmarks.estimation.thesis import solve_position
 from numpy.typing import NDArray
 
 from tests.benchmark.peers import betke_gurvits, sayed, total
 from tests.benchmark.rows import Row
 from tests.estimation.worlds import Array, Snapshots, nees, pose_errors, thesis_like
-from toolkit.estimation.pose import solve_poses
-from toolkit.estimation.thesis import solve_position
 
 _FEW = 2000
 _WRONG_M = 1.0

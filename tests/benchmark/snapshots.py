@@ -5,15 +5,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from mcap_landmarks.estimation.calibration import calibrate
+from mcap_landmarks.estimation.pose import solve_poses
+from mcap_landmarks.estimation.thesis import solve_position
 from numpy.typing import NDArray
 from scipy.io import loadmat
 
 from tests.benchmark.peers import betke_gurvits, sayed, total
 from tests.benchmark.rows import Row
 from tests.estimation.worlds import Array
-from toolkit.estimation.calibration import calibrate
-from toolkit.estimation.pose import solve_poses
-from toolkit.estimation.thesis import solve_position
 
 # What MRCLAM's scene objects are converted with; `calibrate` finds from there what the log really has.
 COVARIANCE = np.diag([0.12**2, 0.03**2])

@@ -8,14 +8,14 @@ from multiprocessing import get_context
 from typing import TypeVar, cast
 
 import numpy as np
+from mcap_landmarks.estimation.odometry import OdometryNoise
+from mcap_landmarks.geometry.se2 import between
+from mcap_landmarks.localization.decision import Match
+from mcap_landmarks.localization.matching import Matcher
+from mcap_landmarks.localization.sequence import Joiner
+from mcap_landmarks.stage import OdometryAt
 
 from tests.benchmark.worlds import Array, Sensor, World, drive, error, pose_looking_at, scene
-from toolkit.estimation.odometry import OdometryNoise
-from toolkit.geometry.se2 import between
-from toolkit.landmarks.joining import Joiner
-from toolkit.landmarks.matching import Matcher
-from toolkit.landmarks.verdicts import Match
-from toolkit.stage import OdometryAt
 
 LENGTH_M, STEP_M, JOIN_M = 20.0, 1.0, 30.0
 CAMERA = Sensor(half_view_rad=np.deg2rad(31.1))

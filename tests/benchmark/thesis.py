@@ -13,6 +13,10 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from mcap_landmarks.evaluation.pose_metrics import Figures, axis_figures, pose_errors, position_figures
+from mcap_landmarks.report.comparison import errors_figure, positions_figure
+from mcap_landmarks.report.drawing import Drawing, gather
+from mcap_landmarks.report.plots import figure, save
 
 from tests.benchmark.rows import Row, main
 from tests.benchmark.thesis_runs import (
@@ -29,10 +33,6 @@ from tests.benchmark.thesis_runs import (
     stops_of,
 )
 from tests.benchmark.thesis_study import study_rows
-from toolkit.compare.pose_metrics import Figures, axis_figures, pose_errors, position_figures
-from toolkit.report.comparison import errors_figure, positions_figure
-from toolkit.report.drawing import Drawing, gather
-from toolkit.report.plots import figure, save
 
 FIRST_SEED, SEEDS = 10_000, 10
 _APART = 5_000  # of the seed to map and the one to localize, else their noise would be the same

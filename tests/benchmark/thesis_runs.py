@@ -12,19 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mcap_landmarks.channels import ODOMETRY, SCAN, TF
+from mcap_landmarks.cli.console import run_command
+from mcap_landmarks.cli.main import build
+from mcap_landmarks.evaluation.metrics import ScoredPoses, score
+from mcap_landmarks.evaluation.pose_metrics import false_figures, pose_errors
+from mcap_landmarks.evaluation.read import read_reference, read_run
+from mcap_landmarks.evaluation.trajectory import Trajectory, interpolated
+from mcap_landmarks.geometry.se2 import between
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.report.drawing import Drawing, Run, gather
 from numpy.typing import NDArray
-
-from toolkit.channels import ODOMETRY, SCAN, TF
-from toolkit.cli.console import run_command
-from toolkit.cli.main import build
-from toolkit.compare.metrics import ScoredPoses, score
-from toolkit.compare.pose_metrics import false_figures, pose_errors
-from toolkit.compare.read import read_reference, read_run
-from toolkit.compare.trajectory import Trajectory, interpolated
-from toolkit.geometry.se2 import between
-from toolkit.recording.reader import open_recording
-from toolkit.recording.writer import create_recording
-from toolkit.report.drawing import Drawing, Run, gather
 
 Array = NDArray[np.float64]
 Stops = NDArray[np.int64]

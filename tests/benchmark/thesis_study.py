@@ -9,21 +9,21 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from mcap_landmarks.channels import SCAN_OBJECTS, SCENE_OBJECTS
+from mcap_landmarks.evaluation.pose_metrics import position_figures
+from mcap_landmarks.evaluation.read import read_reference
+from mcap_landmarks.evaluation.trajectory import Trajectory, interpolated
+from mcap_landmarks.geometry.se2 import inverse, transform_points
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.scan_objects import ScanObjects
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.stage import Stamped
+from mcap_landmarks_generator.bundled import FOLDER
 
-from generator.bundled import FOLDER
 from tests.benchmark.rows import Row
 from tests.benchmark.thesis_runs import Array, at_stops, call, cut, stops_of
-from toolkit.channels import SCAN_OBJECTS, SCENE_OBJECTS
-from toolkit.compare.pose_metrics import position_figures
-from toolkit.compare.read import read_reference
-from toolkit.compare.trajectory import Trajectory, interpolated
-from toolkit.geometry.se2 import inverse, transform_points
-from toolkit.messages.codec import decode
-from toolkit.messages.scan_objects import ScanObjects
-from toolkit.messages.scene import SceneObjects
-from toolkit.recording.reader import open_recording
-from toolkit.recording.writer import create_recording
-from toolkit.stage import Stamped
 
 RESOLUTIONS = {"1_deg": 360, "0_5_deg": 720, "0_25_deg": 1440}
 SHAPES = {"fire hydrant": "disc", "person": "legs", "suitcase": "box"}

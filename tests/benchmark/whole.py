@@ -49,7 +49,7 @@ def _seconds(*words: object) -> float:
     Raises:
         RuntimeError: it did not end well.
     """
-    command = [sys.executable, "-c", "from toolkit.cli.main import run; run()", *map(str, words)]
+    command = [sys.executable, "-c", "from mcap_landmarks.cli.main import run; run()", *map(str, words)]
     began = time.perf_counter()
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:

@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from mcap_landmarks.geometry.se2 import between, compose, inverse, transform_points
+from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.messages.scene import SceneObjects
 from numpy.typing import NDArray
-
-from toolkit.geometry.se2 import between, compose, inverse, transform_points
-from toolkit.landmarks.model import LandmarkMap, Source
-from toolkit.messages.scene import SceneObjects
 
 Array = NDArray[np.float64]
 APPENDIX_C = Path(__file__).resolve().parents[1] / "data" / "thesis_appendix_c.txt"

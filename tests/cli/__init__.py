@@ -1,1 +1,1 @@
-"""Tests of toolkit.cli."""
+"""Tests of mcap_landmarks.cli."""

@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
-from toolkit.cli.main import run
-from toolkit.recording.reader import open_recording
-from toolkit.resources import resource
+from mcap_landmarks.cli.main import run
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.resources import resource
 
 
 def call(*words: object) -> int:

@@ -4,13 +4,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
+from mcap_landmarks.channels import ODOMETRY, SCENE_OBJECTS, TRUTH_OBJECTS, TRUTH_POSE
+from mcap_landmarks.messages.poses import Odometry, PoseStamped
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.stage import Stamped
 
 from tests.stages.worlds import circle, drifting, ring, scene
-from toolkit.channels import ODOMETRY, SCENE_OBJECTS, TRUTH_OBJECTS, TRUTH_POSE
-from toolkit.messages.poses import Odometry, PoseStamped
-from toolkit.messages.scene import SceneObjects
-from toolkit.recording.writer import create_recording
-from toolkit.stage import Stamped
 
 Change = Callable[[list[Stamped]], list[Stamped]]
 

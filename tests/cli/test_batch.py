@@ -5,10 +5,10 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from mcap_landmarks.recording.reader import open_recording
 
 from tests.cli.calls import call, schema_of
 from tests.cli.logs import messages, write
-from toolkit.recording.reader import open_recording
 
 
 @pytest.fixture(scope="module")

@@ -7,21 +7,21 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from mcap_landmarks.channels import ODOMETRY, SCAN, SCAN_FILTERED, SCAN_OBJECTS, TF_STATIC
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.points import PointCloud2
+from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scan_objects import ScanObjects
+from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.resources import resource
+from mcap_landmarks.stage import Channel, Stamped
 
 from tests.cli.calls import call, topics
 from tests.cli.logs import write
 from tests.lidar.scans import disc, ranges
 from tests.stages.test_cluster import mounting, scan
-from toolkit.channels import ODOMETRY, SCAN, SCAN_FILTERED, SCAN_OBJECTS, TF_STATIC
-from toolkit.messages.codec import decode
-from toolkit.messages.points import PointCloud2
-from toolkit.messages.poses import Odometry
-from toolkit.messages.scan import LaserScan
-from toolkit.messages.scan_objects import ScanObjects
-from toolkit.messages.transforms import TFMessage
-from toolkit.recording.reader import open_recording
-from toolkit.resources import resource
-from toolkit.stage import Channel, Stamped
 
 SCHEMA = json.loads(resource("schemas", "json/cluster.schema.json").read_text())
 SECOND = 10**9

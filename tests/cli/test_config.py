@@ -6,9 +6,9 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from mcap_landmarks.resources import resource
 
 from tests.cli.calls import call
-from toolkit.resources import resource
 
 
 def test_what_is_in_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,8 +5,7 @@ import re
 import sys
 
 import pytest
-
-from toolkit.cli.console import progress
+from mcap_landmarks.cli.console import progress
 
 
 class Terminal(io.StringIO):

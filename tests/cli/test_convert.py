@@ -7,12 +7,12 @@ from typing import Any
 
 import jsonschema
 import pytest
+from mcap_landmarks.cli.console import DONE, PARTIAL, UNUSABLE, USAGE, run_command
+from mcap_landmarks.cli.main import build
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.resources import resource
 
 from tests.sources.bags import write_mrclam, write_plain_db3, write_ros1, write_ros2
-from toolkit.cli.console import DONE, PARTIAL, UNUSABLE, USAGE, run_command
-from toolkit.cli.main import build
-from toolkit.recording.reader import open_recording
-from toolkit.resources import resource
 
 SCHEMA: dict[str, Any] = json.loads(resource("schemas", "json/convert.schema.json").read_text())
 

@@ -9,19 +9,19 @@ import cv2
 import jsonschema
 import numpy as np
 import pytest
+from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, DETECTIONS
+from mcap_landmarks.manifest import RUN
+from mcap_landmarks.messages.annotations import ImageAnnotations
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.resources import resource
+from mcap_landmarks.stage import Channel, Stamped
 
 from tests.cli.calls import call, topics
 from tests.cli.logs import write
 from tests.vision.networks import answering
-from toolkit.channels import CAMERA_IMAGE, CAMERA_INFO, DETECTIONS
-from toolkit.manifest import RUN
-from toolkit.messages.annotations import ImageAnnotations
-from toolkit.messages.codec import decode
-from toolkit.messages.detections import Detections
-from toolkit.messages.images import CameraInfo, CompressedImage, Image
-from toolkit.recording.reader import open_recording
-from toolkit.resources import resource
-from toolkit.stage import Channel, Stamped
 
 SECOND = 10**9
 SCHEMA: Any = json.loads(resource("schemas", "json/detect.schema.json").read_text())

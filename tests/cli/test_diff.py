@@ -7,18 +7,18 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from mcap_landmarks.channels import MAP, POSE, TRUTH_OBJECTS
+from mcap_landmarks.cli.console import DONE, USAGE, run_command
+from mcap_landmarks.cli.diff import DIFFERENT
+from mcap_landmarks.cli.main import build
+from mcap_landmarks.diff.maps import moved
+from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.messages.poses import PoseStamped
+from mcap_landmarks.resources import resource
 
-from tests.compare.recordings import LANDMARKS, START_NS, localized_log, localized_messages, write
-from tests.compare.runs import BUNDLES, one_run, without
-from tests.landmarks.maps import small_map
-from toolkit.channels import MAP, POSE, TRUTH_OBJECTS
-from toolkit.cli.console import DONE, USAGE, run_command
-from toolkit.cli.diff import DIFFERENT
-from toolkit.cli.main import build
-from toolkit.compare.diff_maps import moved
-from toolkit.landmarks.database import write_map
-from toolkit.messages.poses import PoseStamped
-from toolkit.resources import resource
+from tests.diff.recordings import LANDMARKS, START_NS, localized_log, localized_messages, write
+from tests.evaluation.runs import BUNDLES, one_run, without
+from tests.maps.examples import small_map
 
 DETECTION = ("ids", "hypotheses", "boxes_xyxy")
 

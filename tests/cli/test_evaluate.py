@@ -6,14 +6,14 @@ from typing import Any
 
 import jsonschema
 import pytest
+from mcap_landmarks.channels import TRUTH_OBJECTS, TRUTH_POSE
+from mcap_landmarks.cli.console import DONE, PARTIAL, UNUSABLE, USAGE, run_command
+from mcap_landmarks.cli.main import build
+from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.resources import resource
 
-from tests.compare.recordings import localized_log, localized_messages, write
-from tests.landmarks.maps import small_map
-from toolkit.channels import TRUTH_OBJECTS, TRUTH_POSE
-from toolkit.cli.console import DONE, PARTIAL, UNUSABLE, USAGE, run_command
-from toolkit.cli.main import build
-from toolkit.landmarks.database import write_map
-from toolkit.resources import resource
+from tests.diff.recordings import localized_log, localized_messages, write
+from tests.maps.examples import small_map
 
 DATA = Path(__file__).parents[1] / "data"
 

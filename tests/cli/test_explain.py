@@ -6,15 +6,15 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from mcap_landmarks.channels import CAMERA_IMAGE, DETECTIONS, SCAN, SCAN_OBJECTS, TF_STATIC
+from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.images import Image
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scan_objects import ScanObjects
+from mcap_landmarks.messages.transforms import TFMessage, Transform
 
 from tests.cli.calls import call, schema_of
-from tests.compare.recordings import START_NS, localized_log, localized_messages, write
-from toolkit.channels import CAMERA_IMAGE, DETECTIONS, SCAN, SCAN_OBJECTS, TF_STATIC
-from toolkit.messages.detections import Detections
-from toolkit.messages.images import Image
-from toolkit.messages.scan import LaserScan
-from toolkit.messages.scan_objects import ScanObjects
-from toolkit.messages.transforms import TFMessage, Transform
+from tests.diff.recordings import START_NS, localized_log, localized_messages, write
 
 PNG = b"\x89PNG"
 

@@ -8,18 +8,18 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from mcap_landmarks import channels
+from mcap_landmarks.cli.main import run
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.images import CameraInfo, CompressedImage
+from mcap_landmarks.messages.poses import Odometry, PoseStamped
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.resources import resource
+from mcap_landmarks.stage import Channel, Stamped
 
 from tests.cli.logs import write
 from tests.stages.fusion import THREE, boxes, detected, information, mounted, moved, scanned
-from toolkit import channels
-from toolkit.cli.main import run
-from toolkit.messages.codec import decode
-from toolkit.messages.images import CameraInfo, CompressedImage
-from toolkit.messages.poses import Odometry, PoseStamped
-from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.recording.reader import open_recording
-from toolkit.resources import resource
-from toolkit.stage import Channel, Stamped
 
 SCHEMA: Any = json.loads(resource("schemas", "json/fuse.schema.json").read_text())
 SCAN_NS, IMAGE_NS, TURN_RADPS = 200_000_000, 100_000_000, 0.8

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-
-from toolkit.cli.console import DONE, UNUSABLE, USAGE, run_command
-from toolkit.cli.main import build
-from toolkit.resources import resource
+from mcap_landmarks.cli.console import DONE, UNUSABLE, USAGE, run_command
+from mcap_landmarks.cli.main import build
+from mcap_landmarks.resources import resource
 
 SCENE = """\
 seed = 3
@@ -118,7 +117,7 @@ def test_without_pybullet_it_says_what_to_install(
 
 def test_stdout_is_only_json(scene: Path) -> None:
     """PyBullet prints from C, past Python's streams."""
-    command = [sys.executable, "-c", "from toolkit.cli.main import run; run()", "generate", str(scene)]
+    command = [sys.executable, "-c", "from mcap_landmarks.cli.main import run; run()", "generate", str(scene)]
     options = ["-o", str(scene.with_name("log.mcap")), "--workers", "1", "--json", "--set", "camera.when=never"]
     done = subprocess.run([*command, *options], capture_output=True, text=True, check=True)
     validated(done.stdout)

@@ -8,18 +8,18 @@ import jsonschema
 import numpy as np
 import pytest
 from mcap.writer import Writer as McapWriter
+from mcap_landmarks.channels import MAP, ODOMETRY, POSE, SCENE_OBJECTS, TF_STATIC, TRUTH_POSE
+from mcap_landmarks.cli.console import DONE, PARTIAL, UNUSABLE, run_command
+from mcap_landmarks.cli.main import build
+from mcap_landmarks.messages.poses import Odometry, PoseStamped
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.resources import resource
+from mcap_landmarks.stage import Stamped
 
 from tests.cli.logs import write
 from tests.runs.chain import raw_log, raw_messages
 from tests.sources.bags import write_mrclam, write_plain_db3, write_ros1, write_ros2
-from toolkit.channels import MAP, ODOMETRY, POSE, SCENE_OBJECTS, TF_STATIC, TRUTH_POSE
-from toolkit.cli.console import DONE, PARTIAL, UNUSABLE, run_command
-from toolkit.cli.main import build
-from toolkit.messages.poses import Odometry, PoseStamped
-from toolkit.messages.scene import SceneObjects
-from toolkit.recording.writer import create_recording
-from toolkit.resources import resource
-from toolkit.stage import Stamped
 
 SCHEMA: dict[str, Any] = json.loads(resource("schemas", "json/info.schema.json").read_text())
 SECOND = 10**9

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from mcap_landmarks.cli.console import DONE, UNUSABLE, USAGE, run_command
+from mcap_landmarks.cli.main import build
+from mcap_landmarks.maps.database import read_map, write_map
+from mcap_landmarks.resources import resource
 
-from tests.landmarks.maps import small_map
-from toolkit.cli.console import DONE, UNUSABLE, USAGE, run_command
-from toolkit.cli.main import build
-from toolkit.landmarks.database import read_map, write_map
-from toolkit.resources import resource
+from tests.maps.examples import small_map
 
 APPENDIX_C = Path(__file__).parents[1] / "data" / "thesis_appendix_c.txt"
 

@@ -7,16 +7,16 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from mcap_landmarks.channels import MATCH, POSE
+from mcap_landmarks.cli.console import moment
+from mcap_landmarks.maps.database import read_map, write_map
+from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.resources import resource
 
 from tests.cli.calls import call, refused
 from tests.cli.logs import messages, write
-from toolkit.channels import MATCH, POSE
-from toolkit.cli.console import moment
-from toolkit.landmarks.database import read_map, write_map
-from toolkit.landmarks.model import LandmarkMap, Source
-from toolkit.messages.codec import decode
-from toolkit.recording.reader import open_recording
-from toolkit.resources import resource
 
 STEP_NS = 500_000_000
 

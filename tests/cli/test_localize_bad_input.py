@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_landmarks.channels import MATCH, POSE, SCENE_OBJECTS
+from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.stage import Stamped
 
 from tests.cli.calls import call, refused, topics
 from tests.cli.logs import messages, write
-from toolkit.channels import MATCH, POSE, SCENE_OBJECTS
-from toolkit.landmarks.database import write_map
-from toolkit.landmarks.model import LandmarkMap, Source
-from toolkit.messages.scene import SceneObjects
-from toolkit.stage import Stamped
 
 SOURCE = Source("import", "test")
 KINDS = ("hydrant", "person", "suitcase")

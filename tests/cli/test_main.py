@@ -4,8 +4,7 @@ import subprocess
 import sys
 
 import pytest
-
-from toolkit.cli.main import run, verbs
+from mcap_landmarks.cli.main import run, verbs
 
 HEAVY = ("numpy", "scipy", "rosbags", "matplotlib", "pydantic", "onnxruntime", "cv2", "pybullet", "mcap")
 
@@ -19,7 +18,7 @@ def call(*words: str) -> int:
 def test_help_imports_nothing_heavy() -> None:
     """What keeps `--help` under half a second: the imports wait until their verb runs."""
     script = (
-        "import sys\nfrom toolkit.cli.main import run\n"
+        "import sys\nfrom mcap_landmarks.cli.main import run\n"
         "try:\n    run(['--help'])\nexcept SystemExit as stop:\n    assert not stop.code\n"
         f"print('heavy:', sorted(set({HEAVY!r}) & set(sys.modules)))"
     )

@@ -10,12 +10,12 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from mcap_landmarks.channels import MATCH, ODOMETRY, POSE, SCENE_OBJECTS, TF
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.stage import Channel, Stamped
 
 from tests.cli.calls import call, refused, schema_of, topics
 from tests.cli.logs import messages, write
-from toolkit.channels import MATCH, ODOMETRY, POSE, SCENE_OBJECTS, TF
-from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.stage import Channel, Stamped
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,10 @@ from typing import Annotated
 
 import pytest
 import typer
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.option_groups import LogOptions, ScanOptions, spread
+from mcap_landmarks.errors import UsageError
 from typer.testing import CliRunner
-
-from toolkit.cli import options
-from toolkit.cli.option_groups import LogOptions, ScanOptions, spread
-from toolkit.errors import UsageError
 
 taken: list[object] = []
 

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
+from mcap_landmarks.channels import TRUTH_POSE
+from mcap_landmarks.cli.console import DONE, PARTIAL, UNUSABLE, USAGE, run_command
+from mcap_landmarks.cli.main import build
 
-from tests.compare.recordings import localized_log, localized_messages, write
-from toolkit.channels import TRUTH_POSE
-from toolkit.cli.console import DONE, PARTIAL, UNUSABLE, USAGE, run_command
-from toolkit.cli.main import build
+from tests.diff.recordings import localized_log, localized_messages, write
 
 APPENDIX_D = Path(__file__).parents[1] / "data" / "thesis_appendix_d.txt"
 

@@ -8,18 +8,18 @@ from typing import Any
 
 import jsonschema
 import pytest
+from mcap_landmarks.channels import CAMERA_IMAGE, DETECTIONS, MATCH, SCENE_OBJECTS
+from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.messages.codec import Message
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.resources import resource
+from mcap_landmarks.runs import stage_runner as step
+from mcap_landmarks.runs.tallies import tally
 
 from tests.cli.calls import call
 from tests.cli.logs import write
-from tests.landmarks.maps import small_map
+from tests.maps.examples import small_map
 from tests.runs.chain import COUNT, STEP_NS, counted, raw_log, raw_messages, two_posts
-from toolkit.channels import CAMERA_IMAGE, DETECTIONS, MATCH, SCENE_OBJECTS
-from toolkit.landmarks.database import write_map
-from toolkit.messages.codec import Message
-from toolkit.recording.reader import open_recording
-from toolkit.resources import resource
-from toolkit.runs import step
-from toolkit.runs.tallies import tally
 
 FRONT = "detect,cluster,fuse"
 

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap_landmarks.channels import ODOMETRY, SCAN, TF
+from mcap_landmarks.messages.points import PointCloud2
+from mcap_landmarks.messages.poses import PoseStamped
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.stage import Channel, Stamped
 
 from tests.cli.calls import call, refused
 from tests.cli.logs import write
 from tests.runs.chain import COUNT, counted, raw_messages, two_posts
-from toolkit.channels import ODOMETRY, SCAN, TF
-from toolkit.messages.points import PointCloud2
-from toolkit.messages.poses import PoseStamped
-from toolkit.recording.reader import open_recording
-from toolkit.stage import Channel, Stamped
 
 CLOUD = Channel("/velodyne/points", PointCloud2)
 POSES = Channel("/slam/pose", PoseStamped)

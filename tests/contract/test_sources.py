@@ -7,12 +7,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.inspection.open_logs import OpenLog, open_logs
+from mcap_landmarks.sources import Log, find_source, source_names, source_of
 from pydantic import TypeAdapter
 
 from tests.sources.bags import write_mrclam, write_plain_db3, write_ros1, write_ros2
-from toolkit.errors import RecordingError
-from toolkit.runs.logs import OpenLog, open_logs
-from toolkit.sources import Log, find_source, source_names, source_of
 
 Write = Callable[[Path], Path]
 SAMPLES: dict[str, list[Write]] = {

@@ -5,14 +5,13 @@ import importlib
 import inspect
 
 import pytest
-
-from toolkit import channels
-from toolkit.compare.diff_logs import Topic
-from toolkit.compare.diff_maps import FIELDS
-from toolkit.messages.typestore import definition
-from toolkit.runs.config import effective, stage_config
-from toolkit.stage import Channel, Connection, Reduction, Stage, Tolerance
-from toolkit.stages import find_stage, stage_names
+from mcap_landmarks import channels
+from mcap_landmarks.config import effective, stage_config
+from mcap_landmarks.diff.logs import Topic
+from mcap_landmarks.diff.maps import FIELDS
+from mcap_landmarks.messages.typestore import definition
+from mcap_landmarks.stage import Channel, Connection, Reduction, Stage, Tolerance
+from mcap_landmarks.stages import find_stage, stage_names
 
 KNOWN = {value.topic for value in vars(channels).values() if isinstance(value, Channel)}
 
@@ -24,7 +23,7 @@ def test_there_are_stages() -> None:
 @pytest.mark.parametrize("name", stage_names())
 def test_a_stage_has_its_shape(name: str) -> None:
     stage = find_stage(name)
-    module = importlib.import_module(f"toolkit.stages.{name}")
+    module = importlib.import_module(f"mcap_landmarks.stages.{name}")
     assert stage.name == name
     assert inspect.getdoc(module)
     assert stage.reads

@@ -5,9 +5,8 @@ import shlex
 from pathlib import Path
 
 import pytest
+from mcap_landmarks.cli.main import build, verbs
 from typer.testing import CliRunner
-
-from toolkit.cli.main import build, verbs
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text()

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from mcap_landmarks.estimation.calibration import SensorModel, calibrate
+from mcap_landmarks.estimation.pose import solve_poses
 
 from tests.estimation.worlds import Array, Snapshots, pose_errors, thesis_like
-from toolkit.estimation.calibration import SensorModel, calibrate
-from toolkit.estimation.pose import solve_poses
 
 
 def seen(count: int, sees: int = 4) -> Snapshots:

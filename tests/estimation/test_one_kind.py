@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from mcap_landmarks.estimation.bearings import solve_bearings
+from mcap_landmarks.estimation.pose import position_sigma
+from mcap_landmarks.estimation.ranges import solve_ranges
+from mcap_landmarks.geometry import se2
 
 from tests.estimation.worlds import Array, nees, pose_errors, thesis_like
-from toolkit.estimation.bearings import solve_bearings
-from toolkit.estimation.pose import position_sigma
-from toolkit.estimation.ranges import solve_ranges
-from toolkit.geometry import se2
 
 coordinate = st.floats(-20, 20)
 places = st.lists(st.tuples(coordinate, coordinate), min_size=3, max_size=6, unique=True).map(np.array)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap_landmarks.estimation import closed_form, robust
+from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, motion_covariance
+from mcap_landmarks.estimation.polar import points_from_polar, polar_from_points
+from mcap_landmarks.estimation.symmetric import Symmetric3, Vector3, factor3, inverse2, inverse3, solve3
+from mcap_landmarks.estimation.thesis import solve_position
 
 from tests.estimation.worlds import Array
-from toolkit.estimation import closed_form, robust
-from toolkit.estimation.odometry import Motions, OdometryNoise, motion_covariance
-from toolkit.estimation.sightings import points_from_polar, polar_from_points
-from toolkit.estimation.symmetric import Symmetric3, Vector3, factor3, inverse2, inverse3, solve3
-from toolkit.estimation.thesis import solve_position
 
 
 def symmetric(matrices: Array) -> Symmetric3:

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap_landmarks.estimation.pose import position_sigma, solve_poses
+from mcap_landmarks.geometry import se2
 
 from tests.estimation.worlds import Array, nees, pose_errors, thesis_like
-from toolkit.estimation.pose import position_sigma, solve_poses
-from toolkit.geometry import se2
 
 NOISE = np.diag([0.02**2, np.radians(0.3) ** 2])
 SQUARE = np.array([[4.0, 1.0], [5.0, -1.0], [7.0, 2.0], [9.0, -3.0]])

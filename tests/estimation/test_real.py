@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+from mcap_landmarks.estimation.calibration import calibrate
+from mcap_landmarks.estimation.pose import solve_poses
 
 from tests.benchmark.snapshots import COVARIANCE, read_snapshots
-from toolkit.estimation.calibration import calibrate
-from toolkit.estimation.pose import solve_poses
 
 
 def test_a_real_cameras_ranges_are_depths_and_positions_good(shared_data: Path) -> None:

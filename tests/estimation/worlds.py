@@ -3,9 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
+from mcap_landmarks.geometry.angles import wrap
 from numpy.typing import NDArray
-
-from toolkit.geometry.angles import wrap
 
 Array = NDArray[np.float64]
 

@@ -4,9 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-from generator.checks import Staged, stage
-from generator.loading import load_scenario
+from mcap_landmarks_generator.checks import Staged, stage
+from mcap_landmarks_generator.loading import load_scenario
 
 StageText = Callable[[str], Staged]
 

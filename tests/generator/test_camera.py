@@ -5,20 +5,20 @@ from collections.abc import Iterator
 import cv2
 import numpy as np
 import pytest
+from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks_generator.camera import Intrinsics, View
+from mcap_landmarks_generator.checks import Staged, stage
+from mcap_landmarks_generator.loading import load_scenario
+from mcap_landmarks_generator.optics import Optics
+from mcap_landmarks_generator.renderer import Renderer
+from mcap_landmarks_generator.robot import BASE_FROM_OPTICAL, CAMERA_IN_BASE_M
+from mcap_landmarks_generator.sensor_specs import CameraSpec
+from mcap_landmarks_generator.simulation import static_transforms
+from mcap_landmarks_generator.visibility import true_detections
 from numpy.typing import NDArray
 
-from generator.camera import Intrinsics, View
-from generator.checks import Staged, stage
-from generator.loading import load_scenario
-from generator.optics import Optics
-from generator.renderer import Renderer
-from generator.robot import BASE_FROM_OPTICAL, CAMERA_IN_BASE_M
-from generator.sensor_specs import CameraSpec
-from generator.simulation import static_transforms
-from generator.visibility import true_detections
 from tests.generator.conftest import StageText
-from toolkit.messages.detections import Detections
-from toolkit.messages.transforms import TFMessage
 
 Floats = NDArray[np.float64]
 

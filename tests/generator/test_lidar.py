@@ -4,18 +4,18 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks_generator.checks import Staged
+from mcap_landmarks_generator.history import History, rotate
+from mcap_landmarks_generator.lidar import Lidar, beam_angles, cast, noisy
+from mcap_landmarks_generator.odometry import true_poses
+from mcap_landmarks_generator.randomness import Stream, draws
+from mcap_landmarks_generator.robot import SCAN_IN_BASE_M
+from mcap_landmarks_generator.sensor_specs import LidarSpec
+from mcap_landmarks_generator.world import World
 from numpy.typing import NDArray
 
-from generator.checks import Staged
-from generator.history import History, rotate
-from generator.lidar import Lidar, beam_angles, cast, noisy
-from generator.odometry import true_poses
-from generator.randomness import Stream, draws
-from generator.robot import SCAN_IN_BASE_M
-from generator.sensor_specs import LidarSpec
-from generator.world import World
 from tests.generator.conftest import StageText
-from toolkit.messages.scan import LaserScan
 
 Floats = NDArray[np.float64]
 

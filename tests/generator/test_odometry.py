@@ -2,18 +2,17 @@
 
 import numpy as np
 import pytest
+from mcap_landmarks.geometry.angles import wrap
+from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks_generator.history import History
+from mcap_landmarks_generator.odometry import OdometrySensor, WheelOdometry, true_poses
+from mcap_landmarks_generator.randomness import Stream, draws
+from mcap_landmarks_generator.scenario import TrajectorySpec, Waypoint
+from mcap_landmarks_generator.sensor_specs import OdometrySpec
+from mcap_landmarks_generator.trajectory import Driver
+from mcap_landmarks_generator.world import STEP_NS, World
 from numpy.typing import NDArray
-
-from generator.history import History
-from generator.odometry import OdometrySensor, WheelOdometry, true_poses
-from generator.randomness import Stream, draws
-from generator.scenario import TrajectorySpec, Waypoint
-from generator.sensor_specs import OdometrySpec
-from generator.trajectory import Driver
-from generator.world import STEP_NS, World
-from toolkit.geometry.angles import wrap
-from toolkit.messages.poses import Odometry
-from toolkit.messages.transforms import TFMessage
 
 Floats = NDArray[np.float64]
 

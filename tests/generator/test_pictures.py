@@ -1,8 +1,8 @@
 """The README's pictures show what they say."""
 
 import numpy as np
+from mcap_landmarks_generator.pictures import birds_eye, first_good_image, lidar_field, top_view
 
-from generator.pictures import birds_eye, first_good_image, lidar_field, top_view
 from tests.generator.conftest import StageText
 
 SCENE = """\

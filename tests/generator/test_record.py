@@ -7,23 +7,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_landmarks.channels import CAMERA_IMAGE, ODOMETRY, SCAN, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
+from mcap_landmarks.errors import ToolkitError
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.poses import PoseStamped
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.stage import Stamped
+from mcap_landmarks_generator.camera import ImageJob
+from mcap_landmarks_generator.checks import Staged, stage
+from mcap_landmarks_generator.loading import load_scenario
+from mcap_landmarks_generator.record import record
+from mcap_landmarks_generator.rendering import Darkroom, Messages
+from mcap_landmarks_generator.simulation import Simulation
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from generator.camera import ImageJob
-from generator.checks import Staged, stage
-from generator.loading import load_scenario
-from generator.record import record
-from generator.rendering import Darkroom, Messages
-from generator.simulation import Simulation
 from tests.generator.conftest import StageText
-from toolkit.channels import CAMERA_IMAGE, ODOMETRY, SCAN, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
-from toolkit.errors import ToolkitError
-from toolkit.messages.codec import decode
-from toolkit.messages.poses import PoseStamped
-from toolkit.messages.scene import SceneObjects
-from toolkit.recording.reader import open_recording
-from toolkit.stage import Stamped
 
 SHORT = """\
 seed = 3

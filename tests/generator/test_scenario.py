@@ -6,13 +6,12 @@ from pathlib import Path
 
 import jsonschema
 import pytest
-
-from generator.bundled import FOLDER, bundled
-from generator.checks import stage
-from generator.loading import effective, load_scenario
-from generator.scenario import ADAPTER, json_schema
-from generator.toml_lines import lines_of
-from toolkit.errors import ToolkitError, UsageError
+from mcap_landmarks.errors import ToolkitError, UsageError
+from mcap_landmarks_generator.bundled import FOLDER, bundled
+from mcap_landmarks_generator.checks import stage
+from mcap_landmarks_generator.loading import effective, load_scenario
+from mcap_landmarks_generator.scenario import ADAPTER, json_schema
+from mcap_landmarks_generator.toml_lines import lines_of
 
 GOOD = """\
 seed = 4
@@ -160,7 +159,7 @@ def test_lines_are_found_in_all_that_toml_allows() -> None:
     assert (lines["o", 0], lines["o", 1, "z"], lines["o", 1, "s", "w"]) == (9, 11, 13)
 
 
-_SCHEMA = FOLDER.parents[1] / "schemas" / "json" / "scenario.schema.json"
+_SCHEMA = FOLDER.parents[2] / "schemas" / "json" / "scenario.schema.json"
 
 if __name__ == "__main__":
     _SCHEMA.write_text(json.dumps(json_schema(), indent=2) + "\n")

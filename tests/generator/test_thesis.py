@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from generator.bundled import FOLDER
-from generator.loading import load_scenario
-from toolkit.geometry.angles import wrap
+from mcap_landmarks.geometry.angles import wrap
+from mcap_landmarks_generator.bundled import FOLDER
+from mcap_landmarks_generator.loading import load_scenario
 
 _DATA = Path(__file__).parents[1] / "data"
 _HIGHEST_BEARING_DEG = 31.1

@@ -1,1 +1,1 @@
-"""Tests of toolkit.geometry."""
+"""Tests of mcap_landmarks.geometry."""

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-
-from toolkit.errors import RecordingError
-from toolkit.geometry.camera import CameraModel
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.geometry.camera import CameraModel
 
 K = np.array([[530.5, 0.0, 320.0], [0.0, 528.0, 240.0], [0.0, 0.0, 1.0]])
 PINHOLE = np.array([-0.28, 0.09, 0.001, -0.0007, -0.012])

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.geometry.frames import FrameTree, apply, inverse, planar, rigid
 from scipy.spatial.transform import Rotation
-
-from toolkit.errors import RecordingError
-from toolkit.geometry.frames import FrameTree, apply, inverse, planar, rigid
 
 NUMBER = st.floats(-5, 5)
 TRANSFORM = st.builds(rigid, st.tuples(NUMBER, NUMBER, NUMBER), st.tuples(NUMBER, NUMBER, NUMBER, st.floats(0.1, 5)))

@@ -7,10 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-
-from toolkit.cli.console import DONE, run_command
-from toolkit.cli.main import build
-from toolkit.resources import resource
+from mcap_landmarks.cli.console import DONE, run_command
+from mcap_landmarks.cli.main import build
+from mcap_landmarks.resources import resource
 
 GOLDEN = Path(__file__).parent
 START_NS = 1_767_225_600 * 10**9

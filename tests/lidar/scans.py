@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-
-from toolkit.geometry.se2 import Array, inverse, rotation, transform_points
+from mcap_landmarks.geometry.se2 import Array, inverse, rotation, transform_points
 
 ANGLES_RAD = np.linspace(0.0, 6.28, 360)
 SIGMA_M = 0.01

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from mcap_landmarks.geometry.se2 import Array, exp
+from mcap_landmarks.lidar.beams import Beams, Limits, echoes, sweep, together
+from mcap_landmarks.lidar.clouds import in_slice, slice_beams
 from numpy.typing import NDArray
 
 from tests.lidar.scans import ANGLES_RAD, disc, ranges
-from toolkit.geometry.se2 import Array, exp
-from toolkit.lidar.beams import Beams, Limits, echoes, sweep, together
-from toolkit.lidar.clouds import in_slice, slice_beams
 
 THINGS = [disc(3.0, 0.4, 0.15), disc(-2.0, 2.0, 0.25)]
 UPSIDE_DOWN = np.diag([1.0, -1.0, -1.0, 1.0])

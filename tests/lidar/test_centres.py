@@ -4,16 +4,16 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from mcap_landmarks.geometry.se2 import Array, rotation
+from mcap_landmarks.lidar import shapes
+from mcap_landmarks.lidar.beams import sweep
+from mcap_landmarks.lidar.cells import Noise
+from mcap_landmarks.lidar.centres import Centres, centres
+from mcap_landmarks.lidar.segments import Breaks, points_of, segments
+from mcap_landmarks.lidar.shapes import Shape, profile
+from mcap_landmarks.lidar.windows import windows
 
 from tests.lidar.scans import ANGLES_RAD, Thing, box, disc, legs, ranges
-from toolkit.geometry.se2 import Array, rotation
-from toolkit.lidar import shapes
-from toolkit.lidar.beams import sweep
-from toolkit.lidar.cells import Noise
-from toolkit.lidar.centres import Centres, centres
-from toolkit.lidar.segments import Breaks, points_of, segments
-from toolkit.lidar.shapes import Shape, profile
-from toolkit.lidar.windows import windows
 
 BREAKS = Breaks(np.deg2rad(10.0), 0.01, 5.0)
 CASES = 40

@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
+from mcap_landmarks.geometry.se2 import Array, transform_points
+from mcap_landmarks.lidar import shapes
+from mcap_landmarks.lidar.beams import Beams, sweep, together
+from mcap_landmarks.lidar.cells import Noise
+from mcap_landmarks.lidar.objects import Hypotheses, objects
+from mcap_landmarks.lidar.segments import Breaks, near_clusters, segments
+from mcap_landmarks.lidar.shapes import Shape
 
 from tests.lidar.scans import ANGLES_RAD, SIGMA_M, Thing, box, disc, legs, ranges
-from toolkit.geometry.se2 import Array, transform_points
-from toolkit.lidar import shapes
-from toolkit.lidar.beams import Beams, sweep, together
-from toolkit.lidar.cells import Noise
-from toolkit.lidar.objects import Hypotheses, objects
-from toolkit.lidar.segments import Breaks, near_clusters, segments
-from toolkit.lidar.shapes import Shape
 
 KINDS: dict[str, tuple[Shape, ...]] = {
     "hydrant": (shapes.disc(0.15),),

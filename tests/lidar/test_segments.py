@@ -1,10 +1,10 @@
 """Segments: across the seam of a scan, single hits, walls and what stands before them."""
 
 import numpy as np
+from mcap_landmarks.lidar.beams import Beams, sweep
+from mcap_landmarks.lidar.segments import Breaks, Cluster, extent_m, near_clusters, points_of, segments
 
 from tests.lidar.scans import ANGLES_RAD, Thing, box, disc, legs, ranges
-from toolkit.lidar.beams import Beams, sweep
-from toolkit.lidar.segments import Breaks, Cluster, extent_m, near_clusters, points_of, segments
 
 BREAKS = Breaks(np.deg2rad(10.0), 0.01, 0.3)
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from toolkit.lidar import thesis
+from mcap_landmarks.lidar import thesis
 
 
 def test_the_view_is_cut_and_so_are_ranges() -> None:

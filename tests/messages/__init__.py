@@ -1,1 +1,1 @@
-"""Tests of toolkit.messages."""
+"""Tests of mcap_landmarks.messages."""

@@ -3,19 +3,18 @@
 import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-
-from toolkit.messages.annotations import ImageAnnotations, Label, Outline
-from toolkit.messages.detections import Detections
-from toolkit.messages.images import CameraInfo, CompressedImage, Image
-from toolkit.messages.markers import Marker, MarkerArray, Shape
-from toolkit.messages.match import LandmarkMatch, Status
-from toolkit.messages.numbers import UInt8
-from toolkit.messages.points import PointCloud2
-from toolkit.messages.poses import Odometry, Path, PoseStamped, PoseWithCovarianceStamped
-from toolkit.messages.scan import LaserScan
-from toolkit.messages.scan_objects import ScanObjects
-from toolkit.messages.scene import SceneObjects
-from toolkit.messages.transforms import TFMessage, Transform
+from mcap_landmarks.messages.annotations import ImageAnnotations, Label, Outline
+from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
+from mcap_landmarks.messages.markers import Marker, MarkerArray, Shape
+from mcap_landmarks.messages.match import LandmarkMatch, Status
+from mcap_landmarks.messages.numbers import UInt8
+from mcap_landmarks.messages.points import PointCloud2
+from mcap_landmarks.messages.poses import Odometry, Path, PoseStamped, PoseWithCovarianceStamped
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scan_objects import ScanObjects
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.transforms import TFMessage, Transform
 
 number = st.floats(-1e6, 1e6)
 anything = st.floats(width=64)

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap_landmarks.errors import MessageError
+from mcap_landmarks.messages.codec import Message, encode
+from mcap_landmarks.messages.columns import Kind, Table
+from mcap_landmarks.messages.images import CompressedImage
+from mcap_landmarks.messages.layout import layout_of
+from mcap_landmarks.messages.poses import PoseStamped
+from mcap_landmarks.messages.typestore import definition, typestore
 
 from tests.messages.strategies import MESSAGES
-from toolkit.errors import MessageError
-from toolkit.messages.codec import Message, encode
-from toolkit.messages.columns import Kind, Table
-from toolkit.messages.images import CompressedImage
-from toolkit.messages.layout import layout_of
-from toolkit.messages.poses import PoseStamped
-from toolkit.messages.typestore import definition, typestore
 
 ODD = """# nothing that we know
 int8 small

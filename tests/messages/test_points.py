@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
+from mcap_landmarks.errors import MessageError
+from mcap_landmarks.messages.codec import decode, encode
+from mcap_landmarks.messages.parts import header_to_ros, make
+from mcap_landmarks.messages.points import PointCloud2
+from mcap_landmarks.messages.typestore import typestore
 from numpy.typing import NDArray
-
-from toolkit.errors import MessageError
-from toolkit.messages.codec import decode, encode
-from toolkit.messages.parts import header_to_ros, make
-from toolkit.messages.points import PointCloud2
-from toolkit.messages.typestore import typestore
 
 POINTS = np.array([[1.0, 2.0, 3.0], [4.0, np.nan, 6.0], [-1.0, 0.5, 0.25], [7.0, 8.0, 9.0]])
 

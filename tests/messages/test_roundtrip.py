@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap_landmarks import channels
+from mcap_landmarks.errors import MessageError
+from mcap_landmarks.messages.codec import Message, decode, encode
+from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.messages.typestore import definition
+from mcap_landmarks.stage import Channel
 from rosbags.typesys import Stores, get_typestore
 from rosbags.typesys.msg import get_types_from_msg
 
 from tests.messages.strategies import MESSAGES
-from toolkit import channels
-from toolkit.errors import MessageError
-from toolkit.messages.codec import Message, decode, encode
-from toolkit.messages.poses import Odometry
-from toolkit.messages.typestore import definition
-from toolkit.stage import Channel
 
 
 def same(a: object, b: object) -> bool:

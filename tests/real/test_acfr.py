@@ -10,22 +10,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, DETECTIONS, SCENE_OBJECTS, TF_STATIC
+from mcap_landmarks.cli.main import run
+from mcap_landmarks.geometry import frames
+from mcap_landmarks.geometry.camera import CameraModel
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.images import CameraInfo, CompressedImage
+from mcap_landmarks.messages.points import PointCloud2
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.stage import Channel, Stamped
 from scipy.spatial.transform import Rotation
-
-from toolkit.channels import CAMERA_IMAGE, CAMERA_INFO, DETECTIONS, SCENE_OBJECTS, TF_STATIC
-from toolkit.cli.main import run
-from toolkit.geometry import frames
-from toolkit.geometry.camera import CameraModel
-from toolkit.geometry.se2 import Array
-from toolkit.messages.codec import decode
-from toolkit.messages.detections import Detections
-from toolkit.messages.images import CameraInfo, CompressedImage
-from toolkit.messages.points import PointCloud2
-from toolkit.messages.scene import SceneObjects
-from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.recording.reader import open_recording
-from toolkit.recording.writer import create_recording
-from toolkit.stage import Channel, Stamped
 
 SHOTS = (1, 5, 10, 15, 20, 25, 30, 35)
 SIZE_PX = (1920, 1208)

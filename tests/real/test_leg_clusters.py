@@ -4,14 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.lidar.beams import echoes, sweep
+from mcap_landmarks.lidar.segments import Breaks, extent_m, near_clusters, points_of, segments
+from mcap_landmarks.stages._cluster_config import ClusterConfig
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_typestore
 from scipy.optimize import linear_sum_assignment
-
-from toolkit.geometry.se2 import Array
-from toolkit.lidar.beams import echoes, sweep
-from toolkit.lidar.segments import Breaks, extent_m, near_clusters, points_of, segments
-from toolkit.stages._cluster_config import ClusterConfig
 
 LARGEST_LEGS_M = 0.35
 NEAR_M = 0.05

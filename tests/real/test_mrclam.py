@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-
-from toolkit.cli.main import run
+from mcap_landmarks.cli.main import run
 
 
 def call(*words: object) -> None:

@@ -5,21 +5,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_landmarks.channels import SCENE_OBJECTS, TRUTH_POSE
+from mcap_landmarks.cli.main import run
+from mcap_landmarks.estimation.polar import points_from_polar
+from mcap_landmarks.evaluation.metrics import score
+from mcap_landmarks.evaluation.read import read_run
+from mcap_landmarks.evaluation.trajectory import nearest
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.messages.poses import PoseStamped
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.stage import Stamped
 from scipy.io import loadmat
-
-from toolkit.channels import SCENE_OBJECTS, TRUTH_POSE
-from toolkit.cli.main import run
-from toolkit.compare.metrics import score
-from toolkit.compare.read import read_run
-from toolkit.compare.trajectory import nearest
-from toolkit.estimation.sightings import points_from_polar
-from toolkit.geometry.se2 import Array
-from toolkit.landmarks.database import write_map
-from toolkit.landmarks.model import LandmarkMap, Source
-from toolkit.messages.poses import PoseStamped
-from toolkit.messages.scene import SceneObjects
-from toolkit.recording.writer import create_recording
-from toolkit.stage import Stamped
 
 STEP_NS, STRIDE = 10**8, 8
 POLAR = np.diag([0.12**2, 0.03**2])

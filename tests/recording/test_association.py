@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
-
-from toolkit.channels import DETECTIONS, ODOMETRY, SCENE_OBJECTS, TF_STATIC
-from toolkit.geometry import se2
-from toolkit.messages.detections import Detections
-from toolkit.messages.poses import Odometry, PoseStamped
-from toolkit.messages.scene import SceneObjects
-from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.recording.association import WINDOW_NS, Association, associate
-from toolkit.recording.trail import odometry_from
-from toolkit.stage import Bundle
+from mcap_landmarks.channels import DETECTIONS, ODOMETRY, SCENE_OBJECTS, TF_STATIC
+from mcap_landmarks.geometry import se2
+from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.poses import Odometry, PoseStamped
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.recording.association import WINDOW_NS, Association, associate
+from mcap_landmarks.recording.odometry_buffer import odometry_from
+from mcap_landmarks.stage import Bundle
 
 SECOND = 10**9
 

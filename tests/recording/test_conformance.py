@@ -5,8 +5,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-
-from toolkit.recording.reader import open_recording
+from mcap_landmarks.recording.reader import open_recording
 
 
 def _expected(records: list[dict]) -> tuple[list[tuple], list[str], set[str], int]:

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_landmarks.errors import ToolkitError
+from mcap_landmarks.recording.reader import open_recording
 
 from tests.recording.test_writer import write_log
-from toolkit.errors import ToolkitError
-from toolkit.recording.reader import open_recording
 
 
 @pytest.mark.parametrize("seed", range(40))

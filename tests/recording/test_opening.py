@@ -3,11 +3,10 @@
 from pathlib import Path
 
 import pytest
-
-from toolkit.errors import RecordingError, ToolkitError
-from toolkit.manifest import file_hash
-from toolkit.recording.reader import open_recording
-from toolkit.recording.writer import create_recording
+from mcap_landmarks.errors import RecordingError, ToolkitError
+from mcap_landmarks.manifest import file_hash
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.recording.writer import create_recording
 
 
 @pytest.mark.parametrize(

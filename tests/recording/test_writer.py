@@ -8,15 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap_landmarks.channels import CAMERA_IMAGE, ODOMETRY, SCENE_OBJECTS
+from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
+from mcap_landmarks.messages.images import CompressedImage
+from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.stage import Connection, RawMessage, Stamped
 from rosbags.highlevel import AnyReader
-
-from toolkit.channels import CAMERA_IMAGE, ODOMETRY, SCENE_OBJECTS
-from toolkit.errors import RecordingError, ToolkitError, UsageError
-from toolkit.messages.images import CompressedImage
-from toolkit.messages.poses import Odometry
-from toolkit.recording.reader import open_recording
-from toolkit.recording.writer import create_recording
-from toolkit.stage import Connection, RawMessage, Stamped
 
 SECOND = 10**9
 

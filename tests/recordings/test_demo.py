@@ -3,9 +3,8 @@
 from pathlib import Path
 
 import pytest
-
-from toolkit.resources import resource
-from toolkit.runs.info import describe
+from mcap_landmarks.inspection.info import describe
+from mcap_landmarks.resources import resource
 
 LOGS = [resource("recordings", f"{name}.mcap") for name in ("demo_map", "demo_localize")]
 

@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_landmarks.channels import MAP_POSE, MATCH, SCENE_OBJECTS, TRUTH_OBJECTS, TRUTH_POSE
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.evaluation.trajectory import Trajectory
+from mcap_landmarks.geometry.se2 import compose, transform_points
+from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.messages.poses import PoseStamped
+from mcap_landmarks.report.drawing import breaks, gather
+from mcap_landmarks.report.plots import FORMATS, figure, save
 
-from tests.compare.recordings import LANDMARKS, START_NS, localized_log, localized_messages, write
-from tests.landmarks.maps import small_map
-from toolkit.channels import MAP_POSE, MATCH, SCENE_OBJECTS, TRUTH_OBJECTS, TRUTH_POSE
-from toolkit.compare.trajectory import Trajectory
-from toolkit.errors import RecordingError
-from toolkit.geometry.se2 import compose, transform_points
-from toolkit.landmarks.database import write_map
-from toolkit.landmarks.model import LandmarkMap, Source
-from toolkit.messages.poses import PoseStamped
-from toolkit.report.drawing import breaks, gather
-from toolkit.report.plots import FORMATS, figure, save
+from tests.diff.recordings import LANDMARKS, START_NS, localized_log, localized_messages, write
+from tests.maps.examples import small_map
 
 APPENDIX_D = Path(__file__).parents[1] / "data" / "thesis_appendix_d.txt"
 MOTION = np.array([30.0, -4.0, 1.0])

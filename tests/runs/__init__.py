@@ -1,1 +1,1 @@
-"""Tests of toolkit.runs."""
+"""Tests of mcap_landmarks.runs."""

@@ -5,16 +5,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY, SCAN, TF_STATIC
+from mcap_landmarks.messages.images import CameraInfo, CompressedImage
+from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.stage import Stamped
+from mcap_landmarks.vision.session import Session
 
 from tests.vision.networks import answering
-from toolkit.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY, SCAN, TF_STATIC
-from toolkit.messages.images import CameraInfo, CompressedImage
-from toolkit.messages.poses import Odometry
-from toolkit.messages.scan import LaserScan
-from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.recording.writer import create_recording
-from toolkit.stage import Stamped
-from toolkit.vision.session import Session
 
 STEP_NS = 200_000_000
 STEP_M = 0.02

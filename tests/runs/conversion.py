@@ -3,11 +3,10 @@
 from collections import Counter
 from pathlib import Path
 
+from mcap_landmarks.runs.convert import Conversion, Converted, Selection, convert
+from mcap_landmarks.stage import unwatched
 from pymcap_cli.doctor import Severity, examine_mcap
 from rosbags.rosbag2 import Reader as Reader2
-
-from toolkit.runs.bench import unwatched
-from toolkit.runs.convert import Conversion, Converted, Selection, convert
 
 
 def run(paths: Path | list[Path], output: Path, selection: Selection | None = None) -> Conversion:

@@ -6,9 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from toolkit.errors import UsageError
-from toolkit.runs.batch import Task, find_logs, outputs_in, run_tasks
+from mcap_landmarks.errors import UsageError
+from mcap_landmarks.runs.batch import Task, find_logs, outputs_in, run_tasks
 
 
 def task(script: str, name: str = "log.mcap") -> Task:

@@ -8,6 +8,9 @@ import pytest
 from mcap.reader import make_reader
 from mcap.records import Attachment
 from mcap.writer import Writer as McapWriter
+from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.runs.convert import Selection
 from rosbags.highlevel import AnyReader
 
 from tests.runs.conversion import doctor, one, run, stored
@@ -22,9 +25,6 @@ from tests.sources.bags import (
     write_ros1,
     write_ros2,
 )
-from toolkit.errors import RecordingError, UsageError
-from toolkit.recording.reader import open_recording
-from toolkit.runs.convert import Selection
 
 BAGS = (
     "legtracker_demo.bag",

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from mcap_landmarks.errors import RecordingError, UsageError
 from rosbags.rosbag1 import Reader as Reader1
 
 from tests.runs.conversion import one, run, stored
@@ -14,7 +15,6 @@ from tests.sources.bags import (
     write_ros1,
     write_ros2,
 )
-from toolkit.errors import RecordingError, UsageError
 
 
 def test_a_cut_bag_gives_an_output_and_its_losses(tmp_path: Path) -> None:
@@ -74,7 +74,7 @@ def test_the_input_is_never_the_output(tmp_path: Path) -> None:
 
 def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     source = write_ros1(tmp_path / "a.bag", count=2000)
-    program = "from toolkit.cli.main import run; run()"
+    program = "from mcap_landmarks.cli.main import run; run()"
     done = subprocess.run(
         [sys.executable, "-c", program, "convert", source, "-o", tmp_path / "out.mcap"],
         capture_output=True,

@@ -6,28 +6,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_landmarks.channels import CAMERA_INFO, MAP, TF, TF_STATIC, TRUTH_OBJECTS
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.manifest import RUN
+from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.images import CameraInfo
+from mcap_landmarks.messages.qos import KEY
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.recording.latched import lasting
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.runs.bundles import Span
+from mcap_landmarks.runs.convert import Selection, convert
+from mcap_landmarks.runs.pipeline import LogRun, run_stages
+from mcap_landmarks.runs.plan import Request
+from mcap_landmarks.stage import Connection, RawMessage, Stamped, unwatched
 
-from tests.landmarks.maps import small_map
+from tests.maps.examples import small_map
 from tests.runs.chain import STEP_NS, raw_messages, two_posts
 from tests.sources.bags import times, write_ros1
-from toolkit.channels import CAMERA_INFO, MAP, TF, TF_STATIC, TRUTH_OBJECTS
-from toolkit.errors import RecordingError
-from toolkit.landmarks.database import write_map
-from toolkit.manifest import RUN
-from toolkit.messages.codec import decode
-from toolkit.messages.images import CameraInfo
-from toolkit.messages.qos import KEY
-from toolkit.messages.scene import SceneObjects
-from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.recording.lasting import lasting
-from toolkit.recording.reader import open_recording
-from toolkit.recording.writer import create_recording
-from toolkit.runs.bench import unwatched
-from toolkit.runs.bundles import Span
-from toolkit.runs.convert import Selection, convert
-from toolkit.runs.pipeline import LogRun, run_stages
-from toolkit.runs.plan import Request
-from toolkit.stage import Connection, RawMessage, Stamped
 
 ALL = ["detect", "cluster", "fuse", "localize"]
 START_NS = 3 * STEP_NS

@@ -3,9 +3,8 @@
 from pathlib import Path
 
 import pytest
-
-from toolkit.errors import RecordingError, UsageError
-from toolkit.runs.outputs import make_folder, output_files
+from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.runs.outputs import make_folder, output_files
 
 
 def test_a_folder_is_made_once_and_used_again(tmp_path: Path) -> None:

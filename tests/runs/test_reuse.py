@@ -6,22 +6,22 @@ from typing import Any
 
 import pytest
 from mcap.writer import Writer as McapWriter
+from mcap_landmarks.channels import DETECTIONS, MATCH, ODOMETRY, SCENE_OBJECTS, TF
+from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.runs import session as bench
+from mcap_landmarks.runs.bundles import Span
+from mcap_landmarks.runs.pipeline import LogRun, run_stages
+from mcap_landmarks.runs.plan import Request, Step
+from mcap_landmarks.runs.thinning import Thinning
+from mcap_landmarks.stage import Stamped
 
 from tests.cli.calls import topics
-from tests.landmarks.maps import small_map
+from tests.maps.examples import small_map
 from tests.runs.chain import COUNT, STEP_NS, counted, raw_log, raw_messages, two_posts
-from toolkit.channels import DETECTIONS, MATCH, ODOMETRY, SCENE_OBJECTS, TF
-from toolkit.errors import RecordingError, UsageError
-from toolkit.landmarks.database import write_map
-from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.recording.reader import open_recording
-from toolkit.recording.writer import create_recording
-from toolkit.runs import bench
-from toolkit.runs.bundles import Span
-from toolkit.runs.pipeline import LogRun, run_stages
-from toolkit.runs.plan import Request, Step
-from toolkit.runs.thinning import Thinning
-from toolkit.stage import Stamped
 
 FRONT = ["detect", "cluster", "fuse"]
 ALL = [*FRONT, "localize"]
@@ -130,7 +130,7 @@ def test_another_model_or_program_runs_anew(here: Path, monkeypatch: pytest.Monk
     run = run_stages(asked(here), here / "out.mcap", FRONT, "run")
     assert states(run) == {"cluster": "reused", "detect": "ran", "fuse": "ran"}
     assert "the file model changed" in reasons(run)["detect"]
-    monkeypatch.setattr("toolkit.runs.plan.code_hash", lambda: "another")
+    monkeypatch.setattr("mcap_landmarks.runs.plan.code_hash", lambda: "another")
     assert "the program changed" in reasons(run_stages(asked(here), here / "out.mcap", FRONT, "run"))["detect"]
 
 

@@ -5,13 +5,12 @@ from collections import Counter
 
 import numpy as np
 import pytest
-
-from toolkit.channels import CAMERA_IMAGE, ODOMETRY
-from toolkit.errors import UsageError
-from toolkit.messages.codec import encode
-from toolkit.messages.poses import Odometry
-from toolkit.runs.thinning import TOO_FAST, TOO_NEAR, Thinning, parse_thinning, thin
-from toolkit.stage import Connection, RawMessage
+from mcap_landmarks.channels import CAMERA_IMAGE, ODOMETRY
+from mcap_landmarks.errors import UsageError
+from mcap_landmarks.messages.codec import encode
+from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.runs.thinning import TOO_FAST, TOO_NEAR, Thinning, parse_thinning, thin
+from mcap_landmarks.stage import Connection, RawMessage
 
 IMAGES, ODOM = Connection(CAMERA_IMAGE.topic, "", b""), Connection(ODOMETRY.topic, Odometry.ROS_TYPE, b"")
 

@@ -1,1 +1,1 @@
-"""Tests of toolkit.sources."""
+"""Tests of mcap_landmarks.sources."""

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.runs.convert import Selection, convert
+from mcap_landmarks.stage import unwatched
 
 from tests.sources.bags import write_plain_db3, write_ros1
-from toolkit.errors import RecordingError
-from toolkit.runs.bench import unwatched
-from toolkit.runs.convert import Selection, convert
 
 Edit = tuple[float, int]
 WHOLE = {"none.bag": 20, "bz2.bag": 20, "lz4.bag": 20, "a.db3": 60}

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap_landmarks.channels import ODOMETRY, SCENE_OBJECTS, TRUTH_OBJECTS, TRUTH_POSE
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.geometry.se2 import compose, exp
+from mcap_landmarks.messages.codec import M, decode
+from mcap_landmarks.messages.poses import Odometry, PoseStamped
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.sources import SourceLog, find_source
+from mcap_landmarks.sources._mrclam_robot import MrclamConfig, integrate, odometry_covariance
+from mcap_landmarks.stage import Channel
 
 from tests.sources.bags import SECOND, write_mrclam
-from toolkit.channels import ODOMETRY, SCENE_OBJECTS, TRUTH_OBJECTS, TRUTH_POSE
-from toolkit.errors import RecordingError
-from toolkit.geometry.se2 import compose, exp
-from toolkit.messages.codec import M, decode
-from toolkit.messages.poses import Odometry, PoseStamped
-from toolkit.messages.scene import SceneObjects
-from toolkit.sources import SourceLog, find_source
-from toolkit.sources._mrclam_robot import MrclamConfig, integrate, odometry_covariance
-from toolkit.stage import Channel
 
 SOURCE = find_source("mrclam")
 START_NS = 1_248_444_187 * SECOND

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap_landmarks.errors import MessageError
+from mcap_landmarks.sources._ros1_types import converted
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from tests.sources.bags import HUMBLE, ROS1
-from toolkit.errors import MessageError
-from toolkit.sources._ros1_types import converted
 
 LINE = "=" * 80 + "\n"
 

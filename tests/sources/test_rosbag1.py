@@ -4,13 +4,13 @@ import struct
 from pathlib import Path
 
 import pytest
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.sources import Log, NoConfig, find_source
+from mcap_landmarks.stage import RawMessage
 from rosbags.rosbag1 import Reader, Writer
 from rosbags.typesys import get_types_from_msg
 
 from tests.sources.bags import HUMBLE, ROS1, START_NS, scan, text, times, write_ros1
-from toolkit.errors import RecordingError
-from toolkit.sources import Log, NoConfig, find_source
-from toolkit.stage import RawMessage
 
 SOURCE = find_source("rosbag1")
 

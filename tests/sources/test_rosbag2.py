@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 import zstandard
+from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.sources import Log, McapFile, SourceLog, find_source
+from mcap_landmarks.sources._db3 import Db3Log
+from mcap_landmarks.sources.rosbag2 import Rosbag2Config
+from mcap_landmarks.stage import RawMessage
 
 from tests.sources.bags import HUMBLE, SECOND, START_NS, scan, text, times, write_plain_db3, write_ros2
-from toolkit.errors import RecordingError, UsageError
-from toolkit.sources import Log, McapFile, SourceLog, find_source
-from toolkit.sources._db3 import Db3Log
-from toolkit.sources.rosbag2 import Rosbag2Config
-from toolkit.stage import RawMessage
 
 SOURCE = find_source("rosbag2")
 

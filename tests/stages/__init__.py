@@ -1,1 +1,1 @@
-"""Tests of toolkit.stages."""
+"""Tests of mcap_landmarks.stages."""

@@ -5,18 +5,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
-from toolkit.channels import CAMERA_INFO, DETECTIONS, SCAN_OBJECTS, SCENE_OBJECTS, TF_STATIC
-from toolkit.geometry import frames
-from toolkit.geometry.camera import CameraModel
-from toolkit.geometry.se2 import Array, exp, inverse, transform_points
-from toolkit.messages.detections import Detections
-from toolkit.messages.images import CameraInfo
-from toolkit.messages.scan_objects import ScanObjects
-from toolkit.messages.scene import SceneObjects
-from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.stage import Bundle, OdometryAt, Omission
-from toolkit.stages.fuse import FuseConfig, process
+from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, SCAN_OBJECTS, SCENE_OBJECTS, TF_STATIC
+from mcap_landmarks.geometry import frames
+from mcap_landmarks.geometry.camera import CameraModel
+from mcap_landmarks.geometry.se2 import Array, exp, inverse, transform_points
+from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.images import CameraInfo
+from mcap_landmarks.messages.scan_objects import ScanObjects
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.stage import Bundle, OdometryAt, Omission
+from mcap_landmarks.stages.fuse import FuseConfig, process
 
 SIZE_PX = (640, 480)
 K = np.array([[530.5, 0.0, 320.0], [0.0, 530.5, 240.0], [0.0, 0.0, 1.0]])

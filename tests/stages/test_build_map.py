@@ -5,17 +5,17 @@ from collections.abc import Iterable
 
 import numpy as np
 import pytest
+from mcap_landmarks.channels import SCENE_OBJECTS
+from mcap_landmarks.errors import MapError
+from mcap_landmarks.evaluation.alignment import fit
+from mcap_landmarks.geometry.se2 import Array, compose, transform_points
+from mcap_landmarks.mapping.observations import LogObservations
+from mcap_landmarks.maps.model import LandmarkMap
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.stage import Bundle
+from mcap_landmarks.stages.build_map import BuildMapConfig, collect, solve
 
 from tests.stages.worlds import circle, drive, ring
-from toolkit.channels import SCENE_OBJECTS
-from toolkit.compare.alignment import fit
-from toolkit.errors import MapError
-from toolkit.geometry.se2 import Array, compose, transform_points
-from toolkit.landmarks.model import LandmarkMap
-from toolkit.landmarks.observations import LogObservations
-from toolkit.messages.scene import SceneObjects
-from toolkit.stage import Bundle
-from toolkit.stages.build_map import BuildMapConfig, collect, solve
 
 CONFIG = BuildMapConfig()
 

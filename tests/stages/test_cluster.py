@@ -7,22 +7,22 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap_landmarks.channels import ODOMETRY, SCAN, SCAN_FILTERED, SCAN_OBJECTS, SECOND_SCAN, TF_STATIC
+from mcap_landmarks.config import stage_config
+from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.geometry.se2 import Array, compose, exp, transform_points
+from mcap_landmarks.messages.codec import Message, decode, encode
+from mcap_landmarks.messages.points import PointCloud2
+from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scan_objects import ScanObjects
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.recording.association import Association, associate
+from mcap_landmarks.stage import Bundle, Omission
+from mcap_landmarks.stages._cluster_config import ClusterConfig
+from mcap_landmarks.stages.cluster import process
 
 from tests.lidar.scans import ANGLES_RAD, Thing, box, disc, ranges
-from toolkit.channels import ODOMETRY, SCAN, SCAN_FILTERED, SCAN_OBJECTS, SECOND_SCAN, TF_STATIC
-from toolkit.errors import RecordingError, UsageError
-from toolkit.geometry.se2 import Array, compose, exp, transform_points
-from toolkit.messages.codec import Message, decode, encode
-from toolkit.messages.points import PointCloud2
-from toolkit.messages.poses import Odometry
-from toolkit.messages.scan import LaserScan
-from toolkit.messages.scan_objects import ScanObjects
-from toolkit.messages.transforms import TFMessage, Transform
-from toolkit.recording.association import Association, associate
-from toolkit.runs.config import stage_config
-from toolkit.stage import Bundle, Omission
-from toolkit.stages._cluster_config import ClusterConfig
-from toolkit.stages.cluster import process
 
 SECOND = 10**9
 THINGS = [disc(3.0, 0.6, 0.15), box(2.5, -1.0, 0.4, 0.5, 0.28)]

@@ -8,20 +8,20 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from mcap_landmarks.channels import ANNOTATIONS, CAMERA_IMAGE, DETECTIONS
+from mcap_landmarks.config import stage_config
+from mcap_landmarks.errors import ModelError, RecordingError, UsageError
+from mcap_landmarks.messages.annotations import ImageAnnotations
+from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.images import CompressedImage, Image
+from mcap_landmarks.stage import Bundle, Omission, Stamped
+from mcap_landmarks.stages import detect
+from mcap_landmarks.stages.detect import DetectConfig, input_size, process, thresholds
+from mcap_landmarks.vision.contract import read_contract
+from mcap_landmarks.vision.prefetch import AHEAD, in_order
+from mcap_landmarks.vision.session import open_session
 
 from tests.vision.networks import NO_METADATA, Export, answering, averaging, yolov5
-from toolkit.channels import ANNOTATIONS, CAMERA_IMAGE, DETECTIONS
-from toolkit.errors import ModelError, RecordingError, UsageError
-from toolkit.messages.annotations import ImageAnnotations
-from toolkit.messages.detections import Detections
-from toolkit.messages.images import CompressedImage, Image
-from toolkit.runs.config import stage_config
-from toolkit.stage import Bundle, Omission, Stamped
-from toolkit.stages import detect
-from toolkit.stages._detect_overlap import AHEAD, in_order
-from toolkit.stages.detect import DetectConfig, input_size, process, thresholds
-from toolkit.vision.contract import read_contract
-from toolkit.vision.session import open_session
 
 NAMES = {"names": "['person', 'car', 'dog']", "stride": "32"}
 ROWS = (  # centre, size, objectness, a probability per class

@@ -6,6 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_landmarks.channels import DETECTIONS, SCENE_MARKERS
+from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.geometry.camera import CameraModel
+from mcap_landmarks.messages.codec import encode
+from mcap_landmarks.messages.markers import MarkerArray, Shape
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.typestore import typestore
+from mcap_landmarks.stage import Bundle, Stamped
+from mcap_landmarks.stages.fuse import FuseConfig, process
 
 from tests.stages.fusion import (
     KNOWN,
@@ -19,15 +28,6 @@ from tests.stages.fusion import (
     moved,
     scanned,
 )
-from toolkit.channels import DETECTIONS, SCENE_MARKERS
-from toolkit.errors import RecordingError, UsageError
-from toolkit.geometry.camera import CameraModel
-from toolkit.messages.codec import encode
-from toolkit.messages.markers import MarkerArray, Shape
-from toolkit.messages.scene import SceneObjects
-from toolkit.messages.typestore import typestore
-from toolkit.stage import Bundle, Stamped
-from toolkit.stages.fuse import FuseConfig, process
 
 SECOND = 10**9
 NAMES = [thing.name for thing in THREE]

@@ -4,11 +4,11 @@ import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
+from mcap_landmarks.channels import SCAN_OBJECTS
+from mcap_landmarks.stage import Bundle, OdometryAt
+from mcap_landmarks.stages.fuse import FuseConfig
 
 from tests.stages.fusion import THREE, Thing, boxes, bundle, detected, fused, scanned
-from toolkit.channels import SCAN_OBJECTS
-from toolkit.stage import Bundle, OdometryAt
-from toolkit.stages.fuse import FuseConfig
 
 SECOND = 10**9
 NAMES = [thing.name for thing in THREE]

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_landmarks.channels import MAP, MATCH, POSE, POSE_COVARIANCE, SCENE_OBJECTS, TF
+from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.maps.exchange_thesis import parse_map
+from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.messages.match import Status
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.stage import Bundle, Stamped
+from mcap_landmarks.stages.localize import LocalizeConfig, process
 
 from tests.stages.worlds import circle, drive, ring
-from toolkit.channels import MAP, MATCH, POSE, POSE_COVARIANCE, SCENE_OBJECTS, TF
-from toolkit.landmarks.database import write_map
-from toolkit.landmarks.exchange_thesis import parse_map
-from toolkit.landmarks.model import LandmarkMap, Source
-from toolkit.messages.match import Status
-from toolkit.messages.scene import SceneObjects
-from toolkit.stage import Bundle, Stamped
-from toolkit.stages.localize import LocalizeConfig, process
 
 APPENDIX_C = Path(__file__).resolve().parents[1] / "data" / "thesis_appendix_c.txt"
 

@@ -4,17 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_landmarks.channels import MATCH, POSE, POSE_COVARIANCE, SCENE_OBJECTS
+from mcap_landmarks.estimation.polar import points_from_polar
+from mcap_landmarks.geometry.se2 import Array, inverse, transform_points
+from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.messages.match import LandmarkMatch, Status
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.stage import Bundle, Stamped
+from mcap_landmarks.stages.localize import LocalizeConfig, process
 
 from tests.estimation.worlds import nees, pose_errors
-from toolkit.channels import MATCH, POSE, POSE_COVARIANCE, SCENE_OBJECTS
-from toolkit.estimation.sightings import points_from_polar
-from toolkit.geometry.se2 import Array, inverse, transform_points
-from toolkit.landmarks.database import write_map
-from toolkit.landmarks.model import LandmarkMap, Source
-from toolkit.messages.match import LandmarkMatch, Status
-from toolkit.messages.scene import SceneObjects
-from toolkit.stage import Bundle, Stamped
-from toolkit.stages.localize import LocalizeConfig, process
 
 AROUND = np.array([[8.0, 1.0], [3.0, 9.0], [-7.0, 6.0], [-8.0, -5.0], [2.0, -9.0]])
 IN_LINE = np.array([[-6.0, 2.0], [0.0, 2.0], [5.0, 2.0], [9.0, 2.0]])

@@ -3,12 +3,11 @@
 from collections.abc import Iterator
 
 import numpy as np
-
-from toolkit.channels import SCENE_OBJECTS
-from toolkit.estimation.sightings import points_from_polar
-from toolkit.geometry.se2 import Array, between, compose, inverse, transform_points
-from toolkit.messages.scene import SceneObjects
-from toolkit.stage import Bundle, OdometryAt
+from mcap_landmarks.channels import SCENE_OBJECTS
+from mcap_landmarks.estimation.polar import points_from_polar
+from mcap_landmarks.geometry.se2 import Array, between, compose, inverse, transform_points
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.stage import Bundle, OdometryAt
 
 CLASSES = ("hydrant", "person", "suitcase")
 RANGE_SIGMA_M, BEARING_SIGMA_RAD = 0.02, 0.005

@@ -7,10 +7,9 @@ from typing import Any, Literal
 
 import numpy as np
 import onnx
+from mcap_landmarks.vision.contract import ANCHORS
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 from onnx import TensorProto, helper, numpy_helper
-
-from toolkit.vision.contract import ANCHORS
 
 SIZES = {"n": (0.33, 0.25), "s": (0.33, 0.50), "m": (0.67, 0.75), "l": (1.0, 1.0), "x": (1.33, 1.25)}
 """Depth and width of each size of YOLOv5."""

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_landmarks.errors import ModelError, UsageError
+from mcap_landmarks.vision.contract import Contract, read_contract
+from mcap_landmarks.vision.session import open_session
 
 from tests.vision.networks import COCO_PARAMETERS, Export, answering, yolov5
-from toolkit.errors import ModelError, UsageError
-from toolkit.vision.contract import Contract, read_contract
-from toolkit.vision.session import open_session
 
 NAMES = {"names": "['person', 'car']"}
 

@@ -5,16 +5,16 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from mcap_landmarks.errors import ModelError
+from mcap_landmarks.vision.contract import ANCHORS, read_contract
+from mcap_landmarks.vision.decode import Candidates, candidates
+from mcap_landmarks.vision.letterbox import fit, fitted_input, tensor
+from mcap_landmarks.vision.nms import suppress
+from mcap_landmarks.vision.session import open_session
 from numpy.typing import NDArray
 
 from tests.vision.networks import Export, Form, yolov5
 from tests.vision.reference import decoded_boxes, greedy, head_rows
-from toolkit.errors import ModelError
-from toolkit.vision.contract import ANCHORS, read_contract
-from toolkit.vision.decode import Candidates, candidates
-from toolkit.vision.letterbox import fit, fitted_input, tensor
-from toolkit.vision.nms import suppress
-from toolkit.vision.session import open_session
 
 NAMES = ("person", "car", "dog", "suitcase")
 THRESHOLDS = np.array([0.3, 0.5, 0.25, 0.4], np.float32)

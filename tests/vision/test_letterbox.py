@@ -3,8 +3,7 @@
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-
-from toolkit.vision.letterbox import fit, fitted_input, tensor
+from mcap_landmarks.vision.letterbox import fit, fitted_input, tensor
 
 sides = st.integers(2, 2000)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap_landmarks.vision.nms import suppress
 
 from tests.vision.reference import greedy
-from toolkit.vision.nms import suppress
 
 
 def check(boxes: np.ndarray, scores: np.ndarray, classes: np.ndarray, iou: float, most: int) -> None:

@@ -6,11 +6,10 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from mcap_landmarks.errors import MessageError
+from mcap_landmarks.messages.images import CompressedImage, Image
+from mcap_landmarks.vision.pixels import ENCODINGS, rgb_from_message
 from numpy.typing import NDArray
-
-from toolkit.errors import MessageError
-from toolkit.messages.images import CompressedImage, Image
-from toolkit.vision.pixels import ENCODINGS, rgb_from_message
 
 COLOURS = np.array([[200, 40, 60], [30, 190, 80], [50, 70, 210], [120, 120, 120]], dtype=np.uint8)
 BAYER = {"rggb": (0, 1, 1, 2), "bggr": (2, 1, 1, 0), "gbrg": (1, 2, 0, 1), "grbg": (1, 0, 2, 1)}

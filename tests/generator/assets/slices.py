@@ -1,10 +1,9 @@
 """Horizontal slices of meshes, and how far rays reach before they meet them: an oracle that knows no PyBullet."""
 
 import numpy as np
+from mcap_landmarks_generator.assets.asset import Asset
+from mcap_landmarks_generator.assets.section import Section
 from numpy.typing import NDArray
-
-from generator.assets.asset import Asset
-from generator.assets.section import Section
 
 Floats = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ import pytest
 
 pytest.importorskip("cv2", reason="needs the extra 'generator'")
 
-from generator.assets import catalog, ground, sky
-from generator.assets.backdrop import Backdrop, cast_shadow
+from mcap_landmarks_generator.assets import catalog, ground, sky
+from mcap_landmarks_generator.assets.backdrop import Backdrop, cast_shadow
 
 WIDTH, HEIGHT, FOCAL = 160, 120, 130.0
 

@@ -10,9 +10,8 @@ pytest.importorskip("cv2", reason="needs the extra 'generator'")
 pytest.importorskip("pybullet", reason="needs the extra 'generator'")
 
 import pybullet
-
-from generator.assets import catalog
-from generator.assets.bullet import AssetStore
+from mcap_landmarks_generator.assets import catalog
+from mcap_landmarks_generator.assets.bullet import AssetStore
 
 
 @pytest.fixture

@@ -8,10 +8,10 @@ import pytest
 
 pytest.importorskip("cv2", reason="needs the extra 'generator'")
 
-from generator.assets import catalog
-from generator.assets.asset import Asset
-from generator.assets.solid import face_normals, welded
-from toolkit.errors import ToolkitError
+from mcap_landmarks.errors import ToolkitError
+from mcap_landmarks_generator.assets import catalog
+from mcap_landmarks_generator.assets.asset import Asset
+from mcap_landmarks_generator.assets.solid import face_normals, welded
 
 EVERYTHING = [(name, variant) for name, variants in catalog.VARIANTS.items() for variant in variants]
 SEEDS = (7, 10_001)

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-
-from generator.assets.section import BAND_M, Box, Disc, Section, box, disc, four_legs, legs
+from mcap_landmarks_generator.assets.section import BAND_M, Box, Disc, Section, box, disc, four_legs, legs
 
 pytest.importorskip("cv2", reason="needs the extra 'generator'")
 
-from generator.assets import catalog
-from generator.assets.asset import Asset
+from mcap_landmarks_generator.assets import catalog
+from mcap_landmarks_generator.assets.asset import Asset
+
 from tests.generator.assets.slices import range_to_section_m, range_to_segments_m, rays_around, segments_at
 
 EVERYTHING = [(name, variant) for name, variants in catalog.VARIANTS.items() for variant in variants]

@@ -8,15 +8,14 @@ import pytest
 torch = pytest.importorskip("torch")
 onnx = pytest.importorskip("onnx")
 import onnxruntime  # noqa: E402 - after what may skip
-
-from generator.training import fitting  # noqa: E402
-from generator.training.coco import NAMES  # noqa: E402
-from generator.training.examples import CLASS_IDS, Batch, Phase  # noqa: E402
-from generator.training.export import export, fused, with_all_classes  # noqa: E402
-from generator.training.loss import complete_iou, loss  # noqa: E402
-from generator.training.network import Decoded, Network  # noqa: E402
-from toolkit.vision.contract import read_contract  # noqa: E402
-from toolkit.vision.session import open_session  # noqa: E402
+from mcap_landmarks.vision.contract import read_contract  # noqa: E402
+from mcap_landmarks.vision.session import open_session  # noqa: E402
+from mcap_landmarks_generator.training import fitting  # noqa: E402
+from mcap_landmarks_generator.training.coco import NAMES  # noqa: E402
+from mcap_landmarks_generator.training.examples import CLASS_IDS, Batch, Phase  # noqa: E402
+from mcap_landmarks_generator.training.export import export, fused, with_all_classes  # noqa: E402
+from mcap_landmarks_generator.training.loss import complete_iou, loss  # noqa: E402
+from mcap_landmarks_generator.training.network import Decoded, Network  # noqa: E402
 
 PARAMETERS = 1_872_157
 # Names of the official file's layers, and where they are here.

@@ -7,10 +7,10 @@ import pytest
 
 pytest.importorskip("pybullet")
 
-from generator.assets.catalog import COCO_ID, HELD_OUT_SEEDS, TRAIN_SEEDS
-from generator.training.examples import CLASS_IDS, Examples, Phase
-from generator.training.pictures import PictureSet, make, render
-from generator.training.worlds import THESIS_CLASSES, TRAINING, judged, scene
+from mcap_landmarks_generator.assets.catalog import COCO_ID, HELD_OUT_SEEDS, TRAIN_SEEDS
+from mcap_landmarks_generator.training.examples import CLASS_IDS, Examples, Phase
+from mcap_landmarks_generator.training.pictures import PictureSet, make, render
+from mcap_landmarks_generator.training.worlds import THESIS_CLASSES, TRAINING, judged, scene
 
 RECIPES = [(TRAINING, 1), (judged("empty", TRAIN_SEEDS), 1)]
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from generator.training.pictures import Labels
-from generator.training.scoring import Found, iou, joined, score
+from mcap_landmarks_generator.training.pictures import Labels
+from mcap_landmarks_generator.training.scoring import Found, iou, joined, score
 
 BOX, AWAY = [10.0, 10.0, 30.0, 50.0], [100.0, 10.0, 120.0, 50.0]
 

@@ -1,0 +1,112 @@
+"""The camera: its intrinsics, when it takes images and from where."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from mcap_landmarks.geometry.angles import wrap
+from mcap_landmarks.messages.images import CameraInfo
+from numpy.typing import NDArray
+
+from mcap_landmarks_generator.clock import measurement_times, to_ns
+from mcap_landmarks_generator.history import History, rotate
+from mcap_landmarks_generator.odometry import true_poses
+from mcap_landmarks_generator.randomness import Stream, draws
+from mcap_landmarks_generator.robot import BASE_FROM_OPTICAL, CAMERA_IN_BASE_M, OPTICAL_FRAME
+from mcap_landmarks_generator.sensor_specs import CameraSpec
+
+Floats = NDArray[np.float64]
+
+_TURN_OVER_NS = 8_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Intrinsics:
+    """A pinhole camera with square pixels; pixel (i, j) covers [i, i + 1) x [j, j + 1), the centre is at W/2, H/2."""
+
+    width_px: int
+    height_px: int
+    focal_px: float
+
+    @classmethod
+    def of(cls, spec: CameraSpec) -> "Intrinsics":
+        """From width, height and horizontal field of view."""
+        focal_px = spec.width_px / 2 / np.tan(np.deg2rad(spec.field_of_view_deg) / 2)
+        return cls(spec.width_px, spec.height_px, float(focal_px))
+
+    def info(self, stamp_ns: int) -> CameraInfo:
+        """The message of an image with the given stamp."""
+        matrix = np.array(
+            [[self.focal_px, 0.0, self.width_px / 2], [0.0, self.focal_px, self.height_px / 2], [0.0, 0.0, 1.0]]
+        )
+        projection = np.column_stack([matrix, np.zeros(3)])
+        size = (self.height_px, self.width_px)
+        return CameraInfo(stamp_ns, OPTICAL_FRAME, *size, "plumb_bob", np.zeros(5), matrix, np.eye(3), projection)
+
+    def rays(self) -> NDArray[np.float32]:
+        """Unit vectors (H, W, 3) in the optical frame through the middles of the pixels."""
+        u = (np.arange(self.width_px) + 0.5 - self.width_px / 2) / self.focal_px
+        v = (np.arange(self.height_px) + 0.5 - self.height_px / 2) / self.focal_px
+        rays = np.empty((self.height_px, self.width_px, 3))
+        rays[..., 0], rays[..., 1], rays[..., 2] = u[None, :], v[:, None], 1.0
+        unit: NDArray[np.float32] = (rays / np.linalg.norm(rays, axis=2, keepdims=True)).astype(np.float32)
+        return unit
+
+    def project(self, points: Floats) -> Floats:
+        """Pixels (N, 2) of points (N, 3) in the optical frame, all in front of the camera."""
+        centre = np.array([self.width_px / 2, self.height_px / 2])
+        pixels: Floats = points[:, :2] / points[:, 2:] * self.focal_px + centre
+        return pixels
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """From where to look: eye (3,), rotation world from optical (3, 3), time after the start."""
+
+    eye_m: Floats
+    world_from_optical: Floats
+    time_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImageJob:
+    """An image to take: the view in the middle of its exposure, and how fast the camera turns meanwhile."""
+
+    index: int
+    stamp_ns: int
+    log_time_ns: int
+    view: View
+    turn_radps: float
+
+
+class Camera:
+    """The images of one simulated recording that are to be rendered, in order."""
+
+    def __init__(self, spec: CameraSpec, seed: int, start_ns: int) -> None:
+        self._spec, self._start_ns = spec, start_ns
+        self._times = measurement_times(spec, draws(seed, Stream.CAMERA_CLOCK))
+        self._next_ns = next(self._times)
+        self._index = 0
+
+    def measure(self, history: History) -> Iterator[ImageJob]:
+        """The images whose time lies in the past."""
+        while self._next_ns <= history.end_ns:
+            if self._spec.when == "always" or (self._spec.when == "stops" and history.standing(self._next_ns)):
+                yield self._job(history, self._next_ns)
+                self._index += 1
+            self._next_ns = next(self._times)
+
+    def _job(self, history: History, time_ns: int) -> ImageJob:
+        at_ns = np.array([time_ns])
+        orientation = history.orientations(at_ns)
+        world_from_base = rotate(np.repeat(orientation, 3, axis=0), np.eye(3)).T
+        before, now = true_poses(history, np.array([max(0, time_ns - _TURN_OVER_NS), time_ns]))[:, 2]
+        stamp_ns = self._start_ns + time_ns + to_ns(self._spec.latency_s)
+        eye = history.positions(at_ns)[0] + world_from_base @ CAMERA_IN_BASE_M
+        return ImageJob(
+            index=self._index,
+            stamp_ns=stamp_ns,
+            log_time_ns=stamp_ns + to_ns(self._spec.delay_s),
+            view=View(eye, world_from_base @ BASE_FROM_OPTICAL, time_ns / 1e9),
+            turn_radps=float(wrap(now - before)) / (_TURN_OVER_NS / 1e9),
+        )

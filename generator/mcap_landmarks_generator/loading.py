@@ -1,0 +1,140 @@
+"""Scenarios from TOML files: what they extend, what the command line sets, and errors that name the line."""
+
+import difflib
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from mcap_landmarks.errors import ToolkitError, UsageError
+from pydantic import ValidationError
+
+from mcap_landmarks_generator.bundled import FOLDER, bundled
+from mcap_landmarks_generator.scenario import ADAPTER, Scenario
+from mcap_landmarks_generator.toml_lines import Location, lines_of
+
+
+@dataclass(frozen=True, slots=True)
+class LoadedScenario:
+    """A scenario, and where each of its values was written."""
+
+    name: str
+    scenario: Scenario
+    origins: Mapping[Location, str]
+
+    def fault(self, location: Location, problem: str) -> ToolkitError:
+        """The error that says where the value at `location` was written and what is wrong with it."""
+        return ToolkitError(f"{_origin(self.origins, self.name, location)}: {problem}")
+
+
+def load_scenario(name: str, settings: Sequence[str] = (), seed: int | None = None) -> LoadedScenario:
+    """The scenario of a bundled name or a TOML file, with `KEY=VALUE` settings such as `camera.rate_hz=5` over it.
+
+    Raises:
+        UsageError: there is no such scenario, or a setting cannot be read.
+        ToolkitError: the scenario is wrong; the message names file and line.
+    """
+    path = _path(name, Path())
+    content, origins = _read(path, ())
+    for text in settings:
+        _set(content, origins, text)
+    try:
+        scenario = ADAPTER.validate_python(content)
+    except ValidationError as error:
+        raise _first_fault(error, origins, path) from error
+    return LoadedScenario(path.stem, scenario if seed is None else replace(scenario, seed=seed), origins)
+
+
+def effective(scenario: Scenario) -> dict[str, Any]:
+    """Every value of a scenario under its name in TOML: the scenario made from these is the same."""
+    content: dict[str, Any] = ADAPTER.dump_python(scenario, mode="json", by_alias=True, exclude_none=True)
+    return content
+
+
+def _path(name: str, beside: Path) -> Path:
+    """The file of a bundled scenario or of a path, which is meant relative to the folder `beside`."""
+    path = FOLDER / f"{name}.toml" if "/" not in name and not name.endswith(".toml") else beside / name
+    if path.is_file():
+        return path
+    names = sorted(bundled())
+    near = difflib.get_close_matches(name, names, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"bundled are {', '.join(names)}"
+    raise UsageError(f"{name}: there is no such scenario file, and none of that name is bundled; {hint}")
+
+
+def _read(path: Path, above: tuple[Path, ...]) -> tuple[dict[str, Any], dict[Location, str]]:
+    """Content of a file over that of the one it extends, and the origin `file:line` of each value."""
+    try:
+        text = path.read_text()
+        content = tomllib.loads(text)
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ToolkitError(f"{path}: not a TOML file: {error}") from error
+    origins = {location: f"{path}:{line}" for location, line in lines_of(text).items()}
+    base_name = content.pop("extends", None)
+    if base_name is None:
+        return content, origins
+    if not isinstance(base_name, str):
+        raise ToolkitError(f"{origins['extends',]}: extends must be the name of a scenario or a file")
+    base_path = _path(base_name, path.parent)
+    if base_path in (path, *above):
+        raise ToolkitError(f"{origins['extends',]}: {base_name} extends this file in turn; remove one of the two lines")
+    base, base_origins = _read(base_path, (path, *above))
+    return _merge(base, base_origins, content, origins, ()), base_origins
+
+
+def _merge(
+    base: dict[str, Any],
+    base_origins: dict[Location, str],
+    content: Mapping[str, Any],
+    origins: Mapping[Location, str],
+    inside: Location,
+) -> dict[str, Any]:
+    """`base` with `content` over it: tables are joined, all else is replaced; the origins in place."""
+    for key, value in content.items():
+        location = (*inside, key)
+        if isinstance(value, dict) and isinstance(base.get(key), dict):
+            _merge(base[key], base_origins, value, origins, location)
+            continue
+        base[key] = value
+        for old in [place for place in base_origins if place[: len(location)] == location]:
+            del base_origins[old]
+        base_origins.update({k: v for k, v in origins.items() if k[: len(location)] == location})
+    return base
+
+
+def _set(content: dict[str, Any], origins: dict[Location, str], text: str) -> None:
+    name, equals, value = text.partition("=")
+    keys = name.split(".")
+    if not equals or not all(keys):
+        raise UsageError(f"--set {text}: write KEY=VALUE, such as camera.rate_hz=5")
+    try:
+        parsed = tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        parsed = value
+    change: dict[str, Any] = {keys[-1]: parsed}
+    for key in reversed(keys[:-1]):
+        change = {key: change}
+    _merge(content, origins, change, {tuple(keys): f"--set {text}"}, ())
+
+
+def _first_fault(error: ValidationError, origins: Mapping[Location, str], path: Path) -> ToolkitError:
+    first = error.errors(include_url=False)[0]
+    location: Location = tuple(first["loc"])
+    if first["type"] == "unexpected_keyword_argument":
+        problem = f"unknown key {location[-1]}"
+    elif first["type"] == "missing":
+        problem = f"the key {location[-1]} is missing"
+    else:
+        message = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
+        problem = f"{'.'.join(str(part) for part in location)} = {first['input']!r}: {message}"
+    origin = _origin(origins, str(path), location)
+    return UsageError(f"{origin}: {problem}") if origin.startswith("--set") else ToolkitError(f"{origin}: {problem}")
+
+
+def _origin(origins: Mapping[Location, str], default: str, location: Location) -> str:
+    """Origin of the innermost known place around a location."""
+    for length in range(len(location), 0, -1):
+        if location[:length] in origins:
+            return origins[location[:length]]
+    return default

@@ -1,0 +1,150 @@
+"""Makes the pictures of the generator's README: `python -m mcap_landmarks_generator.pictures`."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from mcap_landmarks.geometry.se2 import transform_points
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.stage import Stamped
+from numpy.typing import NDArray
+
+from mcap_landmarks_generator.bundled import bundled
+from mcap_landmarks_generator.camera import ImageJob, Intrinsics, View
+from mcap_landmarks_generator.checks import Staged, stage
+from mcap_landmarks_generator.drawing import Image
+from mcap_landmarks_generator.lidar import beam_angles
+from mcap_landmarks_generator.loading import load_scenario
+from mcap_landmarks_generator.optics import Optics
+from mcap_landmarks_generator.renderer import Renderer
+from mcap_landmarks_generator.robot import SCAN_IN_BASE_M
+from mcap_landmarks_generator.simulation import Simulation
+from mcap_landmarks_generator.trajectory import legs_of
+
+Floats = NDArray[np.float64]
+
+_FOLDER = Path(__file__).parent / "images"
+_WAY, _BEAM, _FIELD = (255, 200, 0), (255, 60, 40), (40, 160, 255)
+_FULL_TURN_DEG = 360
+
+
+def make_all() -> None:
+    """Write every picture anew."""
+    # From above the ground's texture would be seen to repeat.
+    world = stage(load_scenario("thesis_map", ["ground.tile_m=12"]))
+    _write("thesis_top", top_view(world, width_px=1100, side_m=108.0))
+    _write("thesis_birds_eye", birds_eye(world, (1280, 640)))
+    _write("lidar_field_of_view", lidar_field(world, width_px=760, side_m=31.0))
+    for name in sorted(bundled()):
+        if not name.endswith("_drift"):
+            _write(name, first_good_image(stage(load_scenario(name))))
+
+
+def top_view(staged: Staged, width_px: int, side_m: float) -> Image:
+    """The whole world from straight above, north up, with the robot's way (thesis, Figures 5.1 and 5.2)."""
+    eye = np.array([0.0, 0.0, 150.0])
+    view, image = _from_above(staged, eye, width_px, side_m)
+    pixel_from = _projection(view, width_px, side_m)
+    for leg in legs_of(staged.scenario.trajectory, staged.start):
+        _line(image, pixel_from(leg.way_xy), _WAY)
+        cv2.circle(image, _whole(pixel_from(leg.way_xy[-1:])[0]), 5, _WAY, -1, cv2.LINE_AA)
+    return image
+
+
+def birds_eye(staged: Staged, size_px: tuple[int, int]) -> Image:
+    """The world from a height, seen from the south (thesis, Figure 4.1)."""
+    view = _looking(np.array([0.0, -102.0, 48.0]), np.array([0.0, -8.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    camera = replace(staged.scenario.camera, width_px=size_px[0], height_px=size_px[1], field_of_view_deg=54.0)
+    with Renderer(replace(staged.scenario, camera=camera), staged.objects, 250.0, 250.0) as renderer:
+        return renderer.draw(view).image
+
+
+def lidar_field(staged: Staged, width_px: int, side_m: float) -> Image:
+    """The first scan from above: its range, its beams, and the camera's field of view (thesis, Figure 4.3)."""
+    spec = replace(staged.scenario.lidar, dropout=0.0)
+    scene = replace(staged, scenario=replace(staged.scenario, lidar=spec))
+    scan = next(
+        event.message
+        for event in Simulation(scene).run()
+        if isinstance(event, Stamped) and isinstance(event.message, LaserScan)
+    )
+    lidar = transform_points(staged.start, SCAN_IN_BASE_M[:2])
+    eye = np.array([*transform_points(staged.start, (3.0, 0.0)), 60.0])
+    view, image = _from_above(staged, eye, width_px, side_m)
+    pixel_from = _projection(view, width_px, side_m)
+    directions = beam_angles(spec) + staged.start[2]
+    rays = np.stack([np.cos(directions), np.sin(directions)], axis=1)
+    for ray, distance in zip(rays, scan.ranges_m, strict=True):
+        if np.isfinite(distance):
+            _line(image, pixel_from(np.stack([lidar, lidar + ray * distance])), _BEAM)
+    half = np.deg2rad(staged.scenario.camera.field_of_view_deg / 2)
+    edge = staged.start[2] + np.linspace(-half, half, 60)
+    arc = lidar + spec.range_max_m * np.stack([np.cos(edge), np.sin(edge)], axis=1)
+    _line(image, pixel_from(np.concatenate([[lidar], arc, [lidar]])), _FIELD)
+    circle = np.linspace(0, 2 * np.pi, _FULL_TURN_DEG)
+    _line(image, pixel_from(lidar + spec.range_max_m * np.stack([np.cos(circle), np.sin(circle)], axis=1)), _FIELD)
+    cv2.circle(image, _whole(pixel_from(lidar[None])[0]), 6, _WAY, -1, cv2.LINE_AA)
+    return image
+
+
+def first_good_image(staged: Staged) -> Image:
+    """The first image of a recording, some way into it, that shows at least three objects well."""
+    optics = Optics(staged.scenario.camera, Intrinsics.of(staged.scenario.camera).focal_px, staged.scenario.seed)
+    with Renderer(staged.scenario, staged.objects) as renderer:
+        for event in Simulation(staged).run():
+            if not isinstance(event, ImageJob) or event.index % 5:
+                continue
+            rendered = renderer.draw(event.view)
+            large = [one for one in rendered.visible if one.window.height > 40 and one.window.left > 0]
+            if len(large) >= 3:
+                return optics.expose(rendered.image, event.index, event.turn_radps)
+    return rendered.image
+
+
+def _from_above(staged: Staged, eye: Floats, width_px: int, side_m: float) -> tuple[View, Image]:
+    """A square of ground around a point, seen from above."""
+    view = _looking(eye, np.array([eye[0], eye[1], 0.0]), np.array([0.0, 1.0, 0.0]))
+    camera = replace(
+        staged.scenario.camera,
+        width_px=width_px,
+        height_px=width_px,
+        field_of_view_deg=float(np.rad2deg(2 * np.arctan(side_m / 2 / eye[2]))),
+    )
+    with Renderer(replace(staged.scenario, camera=camera), staged.objects, 250.0, 250.0) as renderer:
+        return view, renderer.draw(view).image
+
+
+def _projection(view: View, width_px: int, side_m: float) -> Callable[[Floats], Floats]:
+    """Function from points (N, 2) on the ground to pixels (N, 2) of `_from_above`."""
+    camera = Intrinsics(width_px, width_px, width_px / side_m * float(view.eye_m[2]))
+
+    def pixel_from(points_xy: Floats) -> Floats:
+        points = np.column_stack([points_xy, np.zeros(len(points_xy))])
+        return camera.project((points - view.eye_m) @ view.world_from_optical)
+
+    return pixel_from
+
+
+def _looking(eye: Floats, target: Floats, upwards: Floats) -> View:
+    forwards = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forwards, upwards)
+    right /= np.linalg.norm(right)
+    return View(eye, np.column_stack([right, np.cross(forwards, right), forwards]), 0.0)
+
+
+def _line(image: Image, pixels: Floats, colour: Sequence[int]) -> None:
+    cv2.polylines(image, [np.rint(pixels * 16).astype(np.int32)], False, colour, 1, cv2.LINE_AA, 4)
+
+
+def _whole(pixel: Floats) -> tuple[int, int]:
+    return round(float(pixel[0])), round(float(pixel[1]))
+
+
+def _write(name: str, image: Image) -> None:
+    cv2.imwrite(str(_FOLDER / f"{name}.jpg"), cv2.cvtColor(image, cv2.COLOR_RGB2BGR), [cv2.IMWRITE_JPEG_QUALITY, 82])
+
+
+if __name__ == "__main__":
+    make_all()

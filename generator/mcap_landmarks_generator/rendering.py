@@ -1,0 +1,142 @@
+"""Renders images in this process or in several workers: the pictures are the same."""
+
+import signal
+from collections import deque
+from contextlib import ExitStack
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.context import SpawnProcess
+from typing import Self
+
+import cv2
+from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, TRUTH_DETECTIONS
+from mcap_landmarks.errors import ToolkitError
+from mcap_landmarks.messages.images import CompressedImage
+from mcap_landmarks.stage import Stamped
+
+from mcap_landmarks_generator.camera import ImageJob, Intrinsics
+from mcap_landmarks_generator.checks import Staged
+from mcap_landmarks_generator.optics import Optics
+from mcap_landmarks_generator.renderer import Renderer
+from mcap_landmarks_generator.robot import OPTICAL_FRAME
+from mcap_landmarks_generator.visibility import true_detections
+
+Messages = tuple[Stamped, ...]
+
+_DIED = "a rendering worker died, perhaps for lack of memory; try --workers 1"
+
+
+class Photographer:
+    """Turns jobs into messages: the image, its CameraInfo and its true detections."""
+
+    def __init__(self, staged: Staged) -> None:
+        cv2.setNumThreads(1)
+        spec, seed = staged.scenario.camera, staged.scenario.seed
+        self._intrinsics = Intrinsics.of(spec)
+        self._optics = Optics(spec, self._intrinsics.focal_px, seed)
+        self._stack = ExitStack()
+        self._renderer = self._stack.enter_context(Renderer(staged.scenario, staged.objects))
+
+    def close(self) -> None:
+        """Disconnect from PyBullet."""
+        self._stack.close()
+
+    def take(self, job: ImageJob) -> Messages:
+        """The messages of one image."""
+        rendered = self._renderer.draw(job.view)
+        detections = true_detections(rendered, self._renderer, job.view, job.stamp_ns)
+        exposed = self._optics.expose(rendered.image, job.index, job.turn_radps)
+        image = CompressedImage(job.stamp_ns, OPTICAL_FRAME, "jpeg", self._optics.jpeg(exposed))
+        info = self._intrinsics.info(job.stamp_ns)
+        return (
+            Stamped(CAMERA_IMAGE, job.log_time_ns, image),
+            Stamped(CAMERA_INFO, job.log_time_ns, info),
+            Stamped(TRUTH_DETECTIONS, job.log_time_ns, detections),
+        )
+
+
+class Darkroom:
+    """Where jobs are handed in and their messages picked up in order; a context manager that ends its workers.
+
+    Jobs go to the workers in turn, each over its own pipe: nothing is shared that a killed worker could leave locked.
+    """
+
+    def __init__(self, staged: Staged, workers: int) -> None:
+        """One worker is this process itself."""
+        self._handed_in = self._picked_up = 0
+        self._done: deque[Messages] = deque()
+        self._photographer = Photographer(staged) if workers == 1 else None
+        context = get_context("spawn")
+        self._workers: list[tuple[SpawnProcess, Connection]] = []
+        for _ in range(workers if workers > 1 else 0):
+            ours, theirs = context.Pipe()
+            process = context.Process(target=_work, args=(staged, theirs), daemon=True)
+            process.start()
+            theirs.close()
+            self._workers.append((process, ours))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._photographer is not None:
+            self._photographer.close()
+        for process, pipe in self._workers:
+            pipe.close()
+            process.terminate()
+            process.join()
+
+    @property
+    def waiting(self) -> int:
+        """Jobs handed in and not picked up yet."""
+        return self._handed_in - self._picked_up
+
+    def hand_in(self, job: ImageJob) -> None:
+        """Have an image rendered.
+
+        Raises:
+            ToolkitError: a worker died.
+        """
+        if self._photographer is not None:
+            self._done.append(self._photographer.take(job))
+        else:
+            try:
+                self._pipe(self._handed_in).send(job)
+            except OSError as error:
+                raise ToolkitError(_DIED) from error
+        self._handed_in += 1
+
+    def is_ready(self) -> bool:
+        """Whether the next messages can be picked up without waiting."""
+        return bool(self._done) or (self.waiting > 0 and self._pipe(self._picked_up).poll())
+
+    def pick_up(self) -> Messages:
+        """The messages of the job that waits longest, once they are there.
+
+        Raises:
+            ToolkitError: a worker died.
+        """
+        if self._photographer is not None:
+            messages = self._done.popleft()
+        else:
+            try:
+                messages = self._pipe(self._picked_up).recv()
+            except (EOFError, OSError) as error:
+                raise ToolkitError(_DIED) from error
+        self._picked_up += 1
+        return messages
+
+    def _pipe(self, number: int) -> "Connection":
+        return self._workers[number % len(self._workers)][1]
+
+
+def _work(staged: Staged, pipe: "Connection") -> None:
+    """Take images until nobody asks for more."""
+    # An interrupt reaches every process of a terminal; the first one ends the others.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    photographer = Photographer(staged)
+    try:
+        while True:
+            pipe.send(photographer.take(pipe.recv()))
+    except (EOFError, OSError):
+        photographer.close()

@@ -1,0 +1,77 @@
+"""Which objects an image shows, where, and how much of each: the truth about its detections."""
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from mcap_landmarks.messages.detections import Detections
+
+from mcap_landmarks_generator.assets.catalog import COCO_ID
+from mcap_landmarks_generator.camera import View
+from mcap_landmarks_generator.renderer import SUPERSAMPLING, Rendered, Renderer, Visible
+from mcap_landmarks_generator.robot import OPTICAL_FRAME
+
+_LEAST_AREA_PX = 4.0
+
+
+def true_detections(rendered: Rendered, renderer: Renderer, view: View, stamp_ns: int) -> Detections:
+    """Box of the visible labelled parts of each object, from the mask; the score is the visible share of them.
+
+    The share counts what other objects and the image's edges hide. Objects are left out that show less than 4 pixels.
+    """
+    names, options, boxes = [], [], []
+    for one in rendered.visible:
+        seen = _seen(rendered, one) if one.placed.asset.name in COCO_ID else None
+        if seen is None:
+            continue
+        share = 1.0
+        beside = [other for other in rendered.visible if other is not one and seen.borders_on(other)]
+        if _beyond_edge(one, renderer) or any(other.may_hide(one) for other in beside):
+            share = min(1.0, seen.area_px / max(renderer.silhouette_px(view, one), seen.area_px))
+        names.append(one.placed.object_id)
+        options.append(((one.placed.asset.name, round(share, 3)),))
+        boxes.append(seen.box_xyxy)
+    return Detections(stamp_ns, OPTICAL_FRAME, tuple(names), tuple(options), np.array(boxes, float).reshape(-1, 4))
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """Box and area, in pixels of the image, of what shows of an object, and the bodies of others right beside it."""
+
+    box_xyxy: tuple[float, float, float, float]
+    area_px: float
+    bodies_beside: frozenset[int]
+
+    def borders_on(self, other: Visible) -> bool:
+        """Whether a body of the other object is right beside it; whatever hides a part of it borders on the rest."""
+        return any(body.body_id in self.bodies_beside for body in other.bodies)
+
+
+def _seen(rendered: Rendered, one: Visible) -> _Seen | None:
+    """What an image shows of an object's labelled parts, None if hardly anything."""
+    inner = rendered.window
+    if inner is None:
+        return None
+    # Only its own window of the mask can show it.
+    left, top = max(one.window.left, inner.left), max(one.window.top, inner.top)
+    part = rendered.body_ids[
+        (top - inner.top) * SUPERSAMPLING : (one.window.bottom - inner.top) * SUPERSAMPLING,
+        (left - inner.left) * SUPERSAMPLING : (one.window.right - inner.left) * SUPERSAMPLING,
+    ]
+    mask = np.isin(part, [body.body_id for body in one.bodies if body.labelled])
+    area_px = int(mask.sum()) / SUPERSAMPLING**2
+    if area_px < _LEAST_AREA_PX:
+        return None
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    x = left + np.array([columns[0], columns[-1] + 1]) / SUPERSAMPLING
+    y = top + np.array([rows[0], rows[-1] + 1]) / SUPERSAMPLING
+    border = cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool) & ~mask
+    beside = frozenset(np.unique(part[border]).tolist())
+    return _Seen((float(x[0]), float(y[0]), float(x[1]), float(y[1])), area_px, beside)
+
+
+def _beyond_edge(one: Visible, renderer: Renderer) -> bool:
+    """Whether an object may reach beyond the image."""
+    width, height = renderer.size_px
+    window = one.window
+    return window.left < 0 or window.top < 0 or window.right > width or window.bottom > height

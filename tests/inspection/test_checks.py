@@ -1,0 +1,157 @@
+"""Every check finds what was planted, and nothing where nothing was."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY, SCAN, SCENE_OBJECTS, TF_STATIC
+from mcap_landmarks.inspection.checks import Finding
+from mcap_landmarks.inspection.info import describe
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.stage import Channel, RawMessage, Stamped, unwatched
+
+from tests.cli.logs import write
+from tests.runs.chain import STEP_NS, raw_messages
+
+SECOND = 10**9
+COUNT = 40
+
+Change = Callable[[Stamped], Stamped | None]
+
+
+def findings(tmp_path: Path, change: Change) -> list[Finding]:
+    content = [changed for stamped in raw_messages(COUNT) if (changed := change(stamped)) is not None]
+    content.sort(key=lambda stamped: stamped.log_time_ns)
+    (log,) = describe(write(tmp_path / "log.mcap", content), {}, unwatched)
+    return list(log.findings or ())
+
+
+def of(channel: Channel, change: Change) -> Change:
+    return lambda stamped: change(stamped) if stamped.channel == channel else stamped
+
+
+def stamped_by(clock: Callable[[int], int]) -> Change:
+    def change(stamped: Stamped) -> Stamped:
+        message = dataclasses.replace(stamped.message, stamp_ns=clock(stamped.log_time_ns))
+        return Stamped(stamped.channel, stamped.log_time_ns, message)
+
+    return change
+
+
+def blind(stamped: Stamped, beams: slice) -> Stamped:
+    ranges = np.full(180, 2.0, np.float32)
+    ranges[beams] = np.inf
+    return Stamped(stamped.channel, stamped.log_time_ns, dataclasses.replace(stamped.message, ranges_m=ranges))
+
+
+def late(stamped: Stamped, shift_ns: int) -> Stamped:
+    return Stamped(stamped.channel, stamped.log_time_ns + shift_ns, stamped.message)
+
+
+def every(stamped: Stamped, period_ns: int) -> Stamped | None:
+    return stamped if stamped.log_time_ns % period_ns == 0 else None
+
+
+def without(first: int, last: int) -> Change:
+    return lambda stamped: None if first * STEP_NS <= stamped.log_time_ns < last * STEP_NS else stamped
+
+
+def uncalibrated(stamped: Stamped) -> Stamped:
+    return Stamped(stamped.channel, 1, dataclasses.replace(stamped.message, intrinsics=np.zeros((3, 3))))
+
+
+def everywhere(stamped: Stamped) -> Stamped:
+    return blind(stamped, slice(0, 0)) if stamped.channel == SCAN else stamped
+
+
+PLANTED: dict[str, tuple[Change, set[tuple[str, str, str]]]] = {
+    "nothing": (lambda stamped: stamped, set()),
+    "slow images": (
+        of(CAMERA_IMAGE, lambda s: every(s, 2 * SECOND)),
+        {("rate", "/camera/image_raw/compressed", "0.5 Hz is slow"), ("partners", "/scan", "28 % of its messages")},
+    ),
+    "a gap": (of(SCAN, without(10, 20)), {("gap", "/scan", "1 gap, the longest of 2.2 s after 1800000000")}),
+    "a gap in odometry": (of(ODOMETRY, without(5, 35)), {("gap", "/odom", "6.2 s"), ("partners", "/scan", "/odom")}),
+    "no stamps": (of(SCAN, stamped_by(lambda _: 0)), {("stamps", "/scan", "40 of 40 stamps are zero")}),
+    "stamps that go back": (
+        of(ODOMETRY, stamped_by(lambda now: now - SECOND * (now == 10 * STEP_NS))),
+        {("stamps", "/odom", "go back 1 times")},
+    ),
+    "a clock that is late": (
+        of(CAMERA_IMAGE, stamped_by(lambda now: now - 300_000_000)),
+        {("clock", "/camera/image_raw/compressed", "0.3 s before those of /odom")},
+    ),
+    "another clock": (
+        of(SCAN, stamped_by(lambda now: now + 3600 * SECOND)),
+        {
+            ("stamps", "/scan", "3.6e+03 s after log times"),
+            ("clock", "/scan", "after those of /odom"),
+            ("partners", "/scan", "0 % of its messages have one of /odom"),
+            ("partners", "/scan", "0 % of its messages have one of /camera"),
+        },
+    ),
+    "few images": (
+        of(CAMERA_IMAGE, without(0, 20)),
+        {("partners", "/scan", "have one of /camera/image_raw/compressed within 0.25 s")},
+    ),
+    "no transforms": (
+        of(TF_STATIC, lambda _: None),
+        {("frames", "/scan", "nothing says where the LiDAR"), ("frames", "/camera/camera_info", "from camera to")},
+    ),
+    "no odometry": (of(ODOMETRY, lambda _: None), {("frames", "", "there is no odometry")}),
+    "no camera_info": (of(CAMERA_INFO, lambda _: None), {("camera", "/camera/image_raw/compressed", "no camera_info")}),
+    "camera_info from before a cut": (of(CAMERA_INFO, lambda s: late(s, 7 * SECOND)), set()),
+    "no calibration": (of(CAMERA_INFO, uncalibrated), {("camera", "/camera/camera_info", "not calibrated")}),
+    "blind beams": (
+        of(SCAN, lambda s: blind(s, slice(45, 60))),
+        {("beams", "/scan", "15 of 180 beams never returned anything in 40 scans: 90 to 118 deg")},
+    ),
+    "a blind LiDAR": (of(SCAN, lambda s: blind(s, slice(0, 180))), {("beams", "/scan", "no beam returned anything")}),
+}
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_what_is_planted_is_found_and_only_that(tmp_path: Path, name: str) -> None:
+    change, expected = PLANTED[name]
+
+    def seeing(stamped: Stamped) -> Stamped | None:  # all beams return something, but for what is planted
+        return change(everywhere(stamped))
+
+    found = findings(tmp_path, seeing)
+    assert {(finding.check, finding.topic) for finding in found} == {(check, topic) for check, topic, _ in expected}
+    for check, topic, words in expected:
+        texts = [finding.text for finding in found if (finding.check, finding.topic) == (check, topic)]
+        assert any(words in text for text in texts), texts
+    assert all(finding.remedy for finding in found)
+
+
+@pytest.mark.parametrize(("topic", "said"), [(SCENE_OBJECTS.topic, []), ("/tags", ["/tags"])])
+def test_results_have_the_stamps_of_what_they_were_made_from(tmp_path: Path, topic: str, said: list[str]) -> None:
+    def logged_late(stamped: Stamped) -> Stamped:
+        if stamped.channel != SCAN:
+            return stamped
+        nothing = (), (), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0)
+        scene = SceneObjects(stamped.log_time_ns, "base_footprint", *nothing)
+        return Stamped(Channel(topic, SceneObjects), stamped.log_time_ns + SECOND, scene)
+
+    assert [finding.topic for finding in findings(tmp_path, logged_late) if finding.check == "clock"] == said
+
+
+def test_problems_come_first(tmp_path: Path) -> None:
+    found = findings(
+        tmp_path, lambda s: of(SCAN, lambda t: blind(t, slice(0, 180)))(s) if s.channel != ODOMETRY else None
+    )
+    assert [finding.level for finding in found] == ["problem", "warning"]
+
+
+def test_a_message_that_does_not_fit_its_type_is_counted(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    with create_recording(path) as writer:
+        for stamped in raw_messages(COUNT):
+            writer.add(everywhere(stamped))
+        writer.write(RawMessage(writer.connection(SCAN), 50 * STEP_NS, 50 * STEP_NS, 0, b"\0\1\0\0"))
+    (log,) = describe(path, {}, unwatched)
+    assert ("messages", "/scan") in {(finding.check, finding.topic) for finding in log.findings or ()}

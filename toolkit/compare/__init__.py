@@ -1,1 +1,0 @@
-"""Accuracy: trajectories and maps against a reference; pure on arrays but for one file."""

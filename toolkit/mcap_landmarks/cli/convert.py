@@ -1,0 +1,87 @@
+"""Convert bags and data sets to MCAP."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, warn
+
+if TYPE_CHECKING:
+    from mcap_landmarks.runs.convert import Conversion, Converted
+
+
+def command(
+    inputs: Annotated[
+        list[Path],
+        typer.Argument(metavar="SRC...", help="ROS 1 .bag; ROS 2 folder, .db3 or .mcap; MRCLAM folder or .zip."),
+    ],
+    output: options.Output,
+    topics: Annotated[
+        list[str] | None, typer.Option("--topics", metavar="REGEX", help="Only topics that match whole; repeatable.")
+    ] = None,
+    start: options.Start = None,
+    end: options.End = None,
+    distro: Annotated[
+        str | None, typer.Option("--distro", help="ROS 2 distribution of bags without definitions, such as humble.")
+    ] = None,
+    config_file: options.ConfigFile = None,
+    settings: options.Settings = None,
+    json: options.Json = False,
+) -> None:
+    """Convert SRC... to MCAP with every message, or tell which ones were lost.
+
+    Several SRC with one file as output are merged by time, as the parts of a split bag are. A data set with several
+    robots gives one file per robot, in a folder.
+    """
+    from mcap_landmarks.config import gather
+    from mcap_landmarks.runs.convert import Selection, convert
+
+    chosen = gather(config_file, settings or [], None)
+    if distro:
+        chosen.setdefault("rosbag2", {})["distro"] = distro
+    selection = Selection(tuple(topics or ()), options.time_ns(start, "--start"), options.time_ns(end, "--end"))
+    conversion = convert(inputs, output, selection, chosen, progress)
+    for done in conversion.outputs:
+        _report(done)
+    for failure in conversion.failures:
+        warn(f"error: {failure}")
+    if json:
+        say_json("convert", _document(conversion))
+    else:
+        for done in conversion.outputs:
+            topic_count = len(done.topics)
+            say(f"{done.path}: {done.topics.total()} messages, {topic_count} topic{'s' if topic_count != 1 else ''}")
+    if conversion.failures or any(done.losses or done.lost for done in conversion.outputs):
+        raise typer.Exit(PARTIAL)
+
+
+def _report(done: "Converted") -> None:
+    for note in done.notes:
+        warn(f"note: {done.path}: {note}")
+    for reason, count in sorted(done.dropped.items()):
+        warn(f"note: {done.path}: left out {count}: {reason}")
+    for loss in done.losses:
+        warn(f"warning: {done.path}: {loss}")
+    if done.lost:
+        warn(f"warning: {done.path}: {done.lost} of {done.declared} declared messages could not be read")
+
+
+def _document(conversion: "Conversion") -> dict[str, object]:
+    dropped: dict[str, int] = {}
+    for done in conversion.outputs:
+        for reason, count in sorted(done.dropped.items()):
+            dropped[reason] = dropped.get(reason, 0) + count
+    return {
+        "outputs": [
+            {"path": str(done.path), "messages": done.topics.total(), "topics": dict(sorted(done.topics.items()))}
+            for done in conversion.outputs
+        ],
+        "declared": sum(done.declared for done in conversion.outputs),
+        "read": sum(done.topics.total() for done in conversion.outputs),
+        "lost": sum(done.lost for done in conversion.outputs),
+        "dropped": dropped,
+        "losses": [loss for done in conversion.outputs for loss in done.losses],
+        "failures": [str(failure) for failure in conversion.failures],
+    }

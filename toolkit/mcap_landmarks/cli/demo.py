@@ -1,0 +1,38 @@
+"""Build a map of one bundled log, localize another in it, and measure the error."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mcap_landmarks.cli.console import say
+
+
+def command(
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="Folder for the results; created if its parent exists.")
+    ] = Path("mcap-landmarks-demo"),
+) -> None:
+    """Build a map of one bundled log, localize another in it, measure the error and draw it.
+
+    Every step is a verb that works the same on your own logs; the command line of each is printed before it runs.
+    """
+    from mcap_landmarks.cli import evaluate, localize, plot
+    from mcap_landmarks.cli import map as build
+    from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
+    from mcap_landmarks.resources import resource
+    from mcap_landmarks.runs.outputs import make_folder
+
+    make_folder(output)
+    seen, asked = resource("recordings", "demo_map.mcap"), resource("recordings", "demo_localize.mcap")
+    database, mapped, localized = output / "map.db", output / "mapped.mcap", output / "localized.mcap"
+    picture, given = output / "localized.png", (ImageOptions(), ScanOptions(), LogOptions())
+
+    say(f"$ mcap-landmarks map {seen} --map {database} -o {mapped}")
+    build.command([seen], database, *given, output=mapped)
+    say(f"\n$ mcap-landmarks localize {asked} --map {database} -o {localized}")
+    localize.command([asked], database, *given, output=localized)
+    say(f"\n$ mcap-landmarks evaluate {localized} --align")
+    evaluate.command(localized, align=True)
+    say(f"\n$ mcap-landmarks plot {localized} --align -o {picture}")
+    plot.command([localized], picture, align=True)

@@ -1,0 +1,43 @@
+"""Detect objects in camera images."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.console import say, table
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions
+from mcap_landmarks.cli.stage_runs import Given, finish, run_over
+
+if TYPE_CHECKING:
+    from mcap_landmarks.runs.pipeline import LogRun
+
+
+def command(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP) with camera images.")],
+    output: options.Output,
+    images: ImageOptions,
+    given: LogOptions,
+    names: options.Names = None,
+) -> None:
+    """Detect objects in the camera images of LOG...; write the input with detections and annotations."""
+    runs = run_over("detect", ["detect"], logs, output, Given(given, images, files={"names": names}))
+    finish("detect", runs, _document, _print, given.json)
+
+
+def _document(run: "LogRun") -> dict[str, object]:
+    return {
+        "images": run.outcome.bundles,
+        "unreadable": run.outcome.unreadable,
+        "detections": sum(run.outcome.counts.values()),
+        "classes": dict(run.outcome.counts),
+    }
+
+
+def _print(runs: "list[LogRun]") -> None:
+    rows = [[str(run.output), str(run.outcome.bundles), str(sum(run.outcome.counts.values()))] for run in runs]
+    table(["output", "images", "detections"], rows)
+    for run in runs:
+        classes = ", ".join(f"{count} {name}" for name, count in run.outcome.counts.items())
+        say(f"{run.output}: {classes or 'nothing'}")

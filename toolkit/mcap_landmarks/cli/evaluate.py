@@ -1,0 +1,196 @@
+"""Measure a run, a map or the thesis's results against the truth."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
+
+if TYPE_CHECKING:
+    from mcap_landmarks.evaluation.metrics import Outcome, Pairing, Reference
+
+
+class Association(StrEnum):
+    """How poses find their truth in time."""
+
+    INTERPOLATE = "interpolate"
+    NEAREST = "nearest"
+
+
+def command(
+    result: Annotated[
+        Path, typer.Argument(metavar="RESULT", help="A log with results, a MAP.db, or results.txt as in Appendix D.")
+    ],
+    align: Annotated[
+        bool, typer.Option("--align", help="Move the poses by the one SE(2) that fits them best.")
+    ] = False,
+    association: Annotated[
+        Association, typer.Option("--association", help="Interpolate the truth, or take the nearest within 10 ms.")
+    ] = Association.INTERPOLATE,
+    max_gap: Annotated[
+        float, typer.Option("--max-gap", min=0, help="Longest gap of the truth to interpolate over, in seconds.")
+    ] = 0.5,
+    reference: Annotated[
+        Path | None, typer.Option("--reference", help="Where the truth is: a log, or a trajectory (.tum, .txt).")
+    ] = None,
+    tum: Annotated[Path | None, typer.Option("--tum", help="Write the estimated poses as a TUM trajectory.")] = None,
+    thesis: Annotated[
+        Path | None, typer.Option("--thesis", help="Write the scored positions as the thesis's Appendix D.")
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Measure poses and map of RESULT against the truth: metres, degrees, false ones, honesty of the covariance.
+
+    The truth is RESULT's own /ground_truth channels, or those of --reference.
+    """
+    from mcap_landmarks.evaluation.metrics import evaluate
+    from mcap_landmarks.evaluation.read import read_reference, read_run
+
+    with progress(f"read {result.name}", result.stat().st_size if result.is_file() else None) as advance:
+        outcome, truth, losses = read_run(result, advance)
+    if reference is not None:
+        other, more = read_reference(reference)
+        truth, losses = other.over(truth), losses + more
+    _check(result, outcome, truth)
+    pairing = _pairing(association, max_gap)
+    document = evaluate(outcome, truth, pairing, aligned=align)
+    _export(outcome, truth, pairing, tum, thesis)
+    if document["localized"] and not document["scored"] and truth.trajectory is not None:
+        warn(f"note: {result}: no pose has a truth near enough in time; see --max-gap and --association")
+    if json:
+        say_json("evaluate", document)
+    else:
+        _print(document)
+    for loss in losses:
+        warn(f"warning: {result}: {loss}")
+    if losses:
+        raise typer.Exit(PARTIAL)
+
+
+def _check(result: Path, outcome: "Outcome", truth: "Reference") -> None:
+    from mcap_landmarks.errors import RecordingError, UsageError
+
+    if not outcome.bundles and not len(outcome.trajectory) and outcome.landmarks is None:
+        raise RecordingError(f"{result}: has no results to evaluate; run localize on it first")
+    if truth.trajectory is None and truth.objects is None:
+        raise UsageError(f"{result}: holds no truth; name a log or a TUM trajectory that has it with --reference")
+    if not len(outcome.trajectory) and not outcome.bundles and truth.objects is None:
+        raise UsageError(f"{result}: a map is measured against objects; name a log with them with --reference")
+
+
+def _pairing(association: Association, max_gap_s: float) -> "Pairing":
+    from functools import partial
+
+    from mcap_landmarks.evaluation.trajectory import interpolated, nearest
+
+    if association is Association.NEAREST:
+        return partial(nearest, max_difference_ns=10_000_000)
+    return partial(interpolated, max_gap_ns=round(max_gap_s * 1e9))
+
+
+def _export(outcome: "Outcome", truth: "Reference", pairing: "Pairing", tum: Path | None, thesis: Path | None) -> None:
+    from mcap_landmarks.atomic import atomic_file
+    from mcap_landmarks.evaluation.metrics import score
+    from mcap_landmarks.evaluation.thesis_results import results_of
+    from mcap_landmarks.evaluation.tum import render
+    from mcap_landmarks.maps.exchange_thesis import render_results
+
+    if tum:
+        with atomic_file(tum) as stream:
+            stream.write(render(outcome.trajectory).encode())
+    if thesis:
+        scored = score(outcome.trajectory, truth, pairing, aligned=False)
+        with atomic_file(thesis) as stream:
+            stream.write(render_results(results_of(outcome, scored)).encode())
+
+
+def _print(document: dict[str, Any]) -> None:
+    parts = [
+        part
+        for part, wanted in (
+            (_print_counts, document["bundles"] or document["localized"]),
+            (_print_poses, document["scored"]),
+            (_print_map, document["map"]),
+        )
+        if wanted
+    ]
+    for i, part in enumerate(parts):
+        if i:
+            say()
+        part(document)
+
+
+def _print_counts(document: dict[str, Any]) -> None:
+    eligible = document["eligible"]
+    rows = [[name, str(document[name] if document[name] is not None else "-"), ""] for name in _COUNTS]
+    whole, name = (document["bundles"], "bundles") if document["statuses"] is None else (eligible, "eligible")
+    rows[2][2] = _percent(document["localized"] / whole if whole else None) + f" of {name}"
+    false = document["false"]
+    rows.append(["false: over 1 m or 20 degrees", str(false["count"]), _percent(false["share"]) + " of scored"])
+    rows.extend([f"status {name}", str(count), ""] for name, count in (document["statuses"] or {}).items())
+    table(["bundles", "count", "share"], rows)
+
+
+_COUNTS = ("bundles", "eligible", "localized", "scored")
+
+
+def _print_poses(document: dict[str, Any]) -> None:
+    position, heading, fit = document["position"], document["heading"], document["alignment"]
+    table(
+        ["position", "RMSE", "median", "95 %", "max", "in 0.2 m", "in 1 m"],
+        [
+            [
+                "after one SE(2) fit" if fit else "as it stands",
+                *(_metres(position[key]) for key in ("rmse_m", "median_m", "p95_m", "max_m")),
+                _percent(position["within_0_2_m"]),
+                _percent(position["within_1_m"]),
+            ]
+        ],
+    )
+    say()
+    rows = [
+        [
+            name,
+            _metres(axis["median_abs_m"]),
+            *(_number(axis[key], " %") for key in ("mean_relative_percent", "max_relative_percent")),
+            _percent(axis["under_5_percent"]),
+        ]
+        for name, axis in document["axis"].items()
+    ]
+    table(["axis", "median", "mean of truth", "max of truth", "under 5 %"], rows)
+    say()
+    rows = [
+        ["heading RMSE", _number(heading["rmse_deg"], " deg")],
+        ["heading median", _number(heading["median_deg"], " deg")],
+        ["NEES (1 is honest)", _number(document["nees"], "")],
+        ["RPE from pose to pose", _metres(document["rpe"])],
+    ]
+    if fit:
+        moved = f"{fit['x_m']:.3f} m, {fit['y_m']:.3f} m, {fit['heading_deg']:.3f} deg"
+        rows.append(["truth from estimate", moved])
+    table(["figure", "value"], rows)
+
+
+def _print_map(document: dict[str, Any]) -> None:
+    figures = document["map"]
+    counts = ["landmarks", "reference", "matched", "missing", "spurious"]
+    errors = [_metres(figures["rmse_aligned_m"]), _metres(figures["rmse_m"])]
+    table(
+        ["map", *counts, "RMSE aligned", "RMSE"],
+        [["against the truth's objects", *(str(figures[name]) for name in counts), *errors]],
+    )
+
+
+def _metres(value: float | None) -> str:
+    return _number(value, " m")
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100 * share:.1f} %"
+
+
+def _number(value: float | None, unit: str) -> str:
+    return "-" if value is None else f"{value:.4f}{unit}"

@@ -1,0 +1,230 @@
+"""Say why a bundle was localized or not, in words and as a picture."""
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.console import say, say_json, table
+
+if TYPE_CHECKING:
+    from mcap_landmarks.evaluation.explain import Condition, Place, Situation
+
+
+def command(
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A log with results, as localize writes it.")],
+    at: Annotated[str, typer.Option("--at", metavar="TIME", help="When: RFC 3339 or integer nanoseconds.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Draw it, too: image, scan and map (.png, .svg, .pdf).")
+    ] = None,
+    json: options.Json = False,
+) -> None:
+    """Say what was detected, clustered and fused at TIME, which places of the map came into question, and which
+    condition of a match held or failed, by how much.
+    """
+    from mcap_landmarks.evaluation.explain import conditions_of, places_of
+    from mcap_landmarks.report.explain_reading import read_situation
+    from mcap_landmarks.report.plots import form_of
+
+    form = form_of(output) if output else ""
+    situation, view = read_situation(result, options.time_ns(at, "--at") or 0)
+    places = places_of(situation)
+    conditions = conditions_of(situation, places)
+    if output:
+        from functools import partial
+
+        from mcap_landmarks.atomic import atomic_file
+        from mcap_landmarks.report.explain_picture import explanation_figure
+        from mcap_landmarks.report.plots import save
+
+        title = f"{result.name} at {situation.stamp_ns}: {_status(situation)}"
+        with atomic_file(output) as stream:
+            save(partial(explanation_figure, situation, places, view, title), stream, form)
+    if json:
+        say_json("explain", _document(situation, places, conditions))
+    else:
+        _print(situation, places, conditions)
+
+
+def _status(situation: "Situation") -> str:
+    return "not matched yet" if situation.match is None else situation.match.status.name.lower()
+
+
+def _print(situation: "Situation", places: "tuple[Place, ...]", conditions: "tuple[Condition, ...]") -> None:
+    match = situation.match
+    before = match.bundles_joined - 1 if match is not None else 0
+    joined = f", judged together with what {before} bundles before it saw" if before > 0 else ""
+    say(f"bundle at {situation.stamp_ns}: {_status(situation)}{joined}")
+    say(f"detected: {_detected(situation)}")
+    say(f"clustered: {_clustered(situation)}")
+    say(f"fused: {_fused(situation)}")
+    if situation.scene is not None and len(situation.scene):
+        say()
+        _print_objects(situation, places)
+    if places:
+        say()
+        _print_places(places)
+    if conditions:
+        say()
+        for condition in conditions:
+            say(f"{'holds' if condition.holds else 'FAILS'}  {condition.name}: {condition.words}")
+    elif match is None:
+        say("There is no match to explain; run localize on the log.")
+
+
+def _detected(situation: "Situation") -> str:
+    found = situation.detections
+    if found is None:
+        return "nothing that the log tells"
+    names = ", ".join(f"{name} {score:.2f}" for options in found.hypotheses for name, score in options[:1])
+    apart_ms = (found.stamp_ns - situation.stamp_ns) / 1e6
+    return f"{names or 'no object'}, in the image {apart_ms:+.0f} ms beside the scan"
+
+
+def _clustered(situation: "Situation") -> str:
+    found = situation.scan_objects
+    if found is None:
+        return "nothing that the log tells"
+    bare = sum(options[0][0] == "" for options in found.hypotheses if options)
+    return f"{len(found)} clusters, {bare} of them rather none of the known shapes"
+
+
+def _fused(situation: "Situation") -> str:
+    scene = situation.scene
+    if scene is None:
+        return "no scene objects at this time"
+    text = f"{len(scene)} objects"
+    if situation.detections is not None:
+        seen = Counter(options[0][0] for options in situation.detections.hypotheses if options)
+        left = seen - Counter(scene.classes)
+        if left:
+            text += f"; detected, but no object: {', '.join(f'{count} {name}' for name, count in sorted(left.items()))}"
+    if situation.landmarks is not None:
+        unknown = sorted(set(scene.classes) - set(situation.landmarks.classes))
+        if unknown:
+            text += f"; classes that the map lacks: {', '.join(unknown)}"
+    return text
+
+
+def _print_objects(situation: "Situation", places: "tuple[Place, ...]") -> None:
+    rows = []
+    for entry in _objects(situation, places):
+        off = "-" if entry["residual_m"] is None else f"{entry['residual_m']:.3f} m, {entry['sigmas']:.1f} sigma"
+        rows.append(
+            [
+                entry["id"] or "-",
+                f"{entry['class']} {entry['probability']:.2f}",
+                f"{entry['range_m']:.2f} m",
+                f"{entry['bearing_deg']:+.1f} deg",
+                "unknown" if entry["sigma_m"] is None else f"{entry['sigma_m']:.3f} m",
+                entry["landmark"] or "-",
+                off,
+            ]
+        )
+    table(["object", "class", "range", "bearing", "sigma", "landmark of the best", "off by"], rows)
+
+
+def _objects(situation: "Situation", places: "tuple[Place, ...]") -> list[dict[str, Any]]:
+    import numpy as np
+
+    scene = situation.scene
+    if scene is None:
+        return []
+    paired: dict[int, tuple[str, float, float]] = {}
+    for place in places[:1]:
+        if place.residual_m is not None and place.sigmas is not None:
+            off = zip(place.landmark_ids, place.residual_m.tolist(), place.sigmas.tolist(), strict=True)
+            paired = dict(zip(place.rows.tolist(), off, strict=True))
+    found = []
+    for i, name in enumerate(scene.ids):
+        x, y = scene.positions_xy[i].tolist()
+        spread = float(np.sqrt(np.linalg.eigvalsh(scene.covariances[i])[-1])) if scene.covariances[i].any() else None
+        label, probability = scene.hypotheses[i][0] if scene.hypotheses[i] else ("", 0.0)
+        landmark, residual_m, sigmas = paired.get(i, (None, None, None))
+        found.append(
+            {
+                "id": name,
+                "class": label,
+                "probability": probability,
+                "x_m": x,
+                "y_m": y,
+                "range_m": float(np.hypot(x, y)),
+                "bearing_deg": float(np.degrees(np.arctan2(y, x))),
+                "sigma_m": spread,
+                "landmark": landmark,
+                "residual_m": residual_m,
+                "sigmas": sigmas,
+            }
+        )
+    return found
+
+
+def _print_places(places: "tuple[Place, ...]") -> None:
+    rows = []
+    for number, place in enumerate(places, 1):
+        fit = ["-", "-", "-", "-"]
+        if place.pose is not None:
+            x, y, heading = _pose(place)
+            fit = [
+                f"{x:.2f} m, {y:.2f} m, {heading:.1f} deg",
+                f"{place.chi2:.1f} / {place.dof}",
+                f"{max(place.residual_m):.3f} m" if place.residual_m is not None else "-",
+                f"{place.sigma_m:.3f} m",
+            ]
+        share = f"{place.share:.4f}" if place.share == place.share else "-"
+        rows.append([str(number), share, *fit, " ".join(place.landmark_ids)])
+    table(["place", "share", "pose", "chi2 / dof", "worst", "sigma", "landmarks"], rows)
+
+
+def _pose(place: "Place") -> tuple[float, float, float]:
+    import numpy as np
+
+    assert place.pose is not None  # noqa: S101 - callers looked
+    x, y, heading = place.pose.tolist()
+    return x, y, float(np.degrees(heading))
+
+
+def _document(
+    situation: "Situation", places: "tuple[Place, ...]", conditions: "tuple[Condition, ...]"
+) -> dict[str, Any]:
+    match, found = situation.match, situation.detections
+    return {
+        "stamp_ns": situation.stamp_ns,
+        "status": None if match is None else match.status.name.lower(),
+        "bundles_joined": None if match is None else match.bundles_joined,
+        "detections": None
+        if found is None
+        else [
+            {"class": options_[0][0], "confidence": options_[0][1], "xyxy": box}
+            for options_, box in zip(found.hypotheses, found.boxes_xyxy.tolist(), strict=True)
+            if options_
+        ],
+        "clusters": None if situation.scan_objects is None else len(situation.scan_objects),
+        "objects": None if situation.scene is None else _objects(situation, places),
+        "places": [
+            {
+                "landmarks": list(place.landmark_ids),
+                "share": place.share,
+                "pose": None if place.pose is None else dict(zip(_POSE, _pose(place), strict=True)),
+                "chi2": place.chi2,
+                "dof": place.dof,
+                "sigma_m": place.sigma_m,
+            }
+            for place in places
+        ],
+        "conditions": [
+            {
+                "name": one.name,
+                "value": one.value,
+                "limit": one.limit,
+                "holds": one.holds,
+                "words": one.words,
+            }
+            for one in conditions
+        ],
+    }
+
+
+_POSE = ("x_m", "y_m", "heading_deg")

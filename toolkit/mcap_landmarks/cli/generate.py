@@ -1,0 +1,90 @@
+"""Drive a robot through a simulated world and record what its sensors see."""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.console import progress, say, say_json, table, warn
+from mcap_landmarks.errors import ToolkitError, UsageError
+
+if TYPE_CHECKING:
+    from mcap_landmarks_generator.checks import Staged
+    from mcap_landmarks_generator.record import Summary
+
+
+def command(
+    scenario: Annotated[
+        str | None, typer.Argument(metavar="SCENARIO", help="Name of a bundled scenario, or a TOML file.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Recording to write (MCAP).")] = None,
+    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed instead of the scenario's.")] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="One value of the scenario; repeatable.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", min=1, help="Processes that render; as many as cores by default.")
+    ] = None,
+    list_scenarios: Annotated[bool, typer.Option("--list", help="List the bundled scenarios and exit.")] = False,
+    json: options.Json = False,
+) -> None:
+    """Drive a robot through the world of SCENARIO and record camera, LiDAR, odometry and the truth in a new MCAP file.
+
+    Collisions are reported in the summary; the recording is complete all the same.
+    """
+    if list_scenarios:
+        _list(json)
+        return
+    if scenario is None or output is None:
+        raise UsageError(
+            "name a scenario and where to write: mcap-landmarks generate SCENARIO -o LOG.mcap (see --list)"
+        )
+    try:
+        from mcap_landmarks_generator.checks import stage
+        from mcap_landmarks_generator.loading import load_scenario
+        from mcap_landmarks_generator.record import record
+        from mcap_landmarks_generator.trajectory import expected_duration_s
+    except ModuleNotFoundError as error:
+        raise ToolkitError(f"{error.name} is not installed: pip install 'mcap-landmarks[generator]'") from error
+
+    staged = stage(load_scenario(scenario, settings or [], seed))
+    way, factor = staged.scenario.trajectory, staged.scenario.robot.speed_factor
+    seconds = round(expected_duration_s(way, staged.start, factor))
+    with progress(f"generate {staged.name}", seconds, "simulated s") as advance:
+        summary = record(staged, output, workers or os.cpu_count() or 1, advance)
+    for time_s, name in summary.collisions:
+        warn(f"warning: {time_s:.1f} s after the start the robot ran into {name}")
+    if json:
+        say_json("generate", _document(staged, output, summary))
+    else:
+        _print(output, summary)
+
+
+def _list(json: bool) -> None:
+    from mcap_landmarks_generator.bundled import bundled
+
+    found = bundled()
+    if json:
+        say_json("generate", {"scenarios": [{"name": name, "description": text} for name, text in found.items()]})
+        return
+    for name, text in found.items():
+        say(f"{name:24}{text}")
+
+
+def _document(staged: "Staged", output: Path, summary: "Summary") -> dict[str, object]:
+    return {
+        "output": str(output),
+        "scenario": staged.name,
+        "seed": staged.scenario.seed,
+        "simulated_s": summary.simulated_s,
+        "topics": summary.messages,
+        "collisions": [{"time_s": time_s, "object": name} for time_s, name in summary.collisions],
+    }
+
+
+def _print(output: Path, summary: "Summary") -> None:
+    table(["topic", "messages"], [[topic, str(count)] for topic, count in sorted(summary.messages.items())])
+    collisions = f", {len(summary.collisions)} collisions" if summary.collisions else ""
+    say(f"{output}: {summary.simulated_s:.1f} s simulated{collisions}")

@@ -1,0 +1,95 @@
+"""Show what logs hold and which verbs can use them."""
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.console import PARTIAL, moment, progress, say, say_json, table, warn
+
+if TYPE_CHECKING:
+    from mcap_landmarks.inspection.info import LogInfo
+
+
+def command(
+    paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Recordings (MCAP), bags or data sets.")],
+    check: Annotated[
+        bool, typer.Option("--check", help="Read everything, and tell what will go wrong and what to do about it.")
+    ] = False,
+    json: options.Json = False,
+) -> None:
+    """Show channels, times and roles of each PATH, and which verbs can use it or what they lack."""
+    from mcap_landmarks.inspection.info import describe
+
+    logs = [log for path in paths for log in describe(path, {}, progress if check else None)]
+    if json:
+        documents = [_document(log) for log in logs]
+        say_json("info", documents[0] if len(documents) == 1 else {"logs": documents})
+    else:
+        for i, log in enumerate(logs):
+            if i:
+                say()
+            _print(log, several=sum(other.path == log.path for other in logs) > 1)
+    for log in logs:
+        for loss in log.losses:
+            warn(f"warning: {loss}")
+    if any(log.losses for log in logs):
+        raise typer.Exit(PARTIAL)
+
+
+def _document(log: "LogInfo") -> dict[str, object]:
+    return {
+        "path": str(log.path),
+        "name": log.name,
+        "profile": log.profile,
+        "start_ns": log.start_ns,
+        "end_ns": log.end_ns,
+        "channels": [
+            {
+                "topic": channel.topic,
+                "type": channel.message_type,
+                "count": channel.count,
+                "rate_hz": channel.rate_hz,
+                "role": channel.role,
+            }
+            for channel in log.channels
+        ],
+        "roles": log.roles,
+        "verbs": list(log.verbs),
+        "missing": log.missing,
+        "losses": list(log.losses),
+        **({} if log.findings is None else {"findings": [dataclasses.asdict(finding) for finding in log.findings]}),
+    }
+
+
+def _print(log: "LogInfo", *, several: bool) -> None:
+    say(f"{log.path}: {log.name}" if several else str(log.path))
+    count = sum(channel.count for channel in log.channels)
+    kind = f"profile {log.profile}, " if log.profile else ""
+    if log.start_ns is None or log.end_ns is None:
+        say(f"{kind}no messages")
+    else:
+        duration = (log.end_ns - log.start_ns) * 1e-9
+        say(f"{kind}{moment(log.start_ns)} to {moment(log.end_ns)}, {duration:.3f} s, {count} messages")
+    rows = [
+        [
+            channel.topic,
+            str(channel.count),
+            "" if channel.rate_hz is None else f"{channel.rate_hz:.2f}",
+            channel.message_type,
+            channel.role or "",
+        ]
+        for channel in log.channels
+    ]
+    table(["topic", "messages", "Hz", "type", "role"], rows)
+    if log.verbs:
+        say(f"ready for: {', '.join(log.verbs)}")
+    for verb, roles in log.missing.items():
+        say(f"{verb} lacks: {', '.join(roles)}")
+    for finding in log.findings or ():
+        about = f"{finding.topic}: " if finding.topic else ""
+        say(f"{finding.level}: {about}{finding.text}; {finding.remedy}")
+    if log.findings == ():
+        say("nothing was found that costs results")

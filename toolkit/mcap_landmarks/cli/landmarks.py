@@ -1,0 +1,133 @@
+"""Import, export and show landmark databases."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.console import say, say_json, table, warn
+
+if TYPE_CHECKING:
+    from mcap_landmarks.maps.exchange import Format
+    from mcap_landmarks.maps.model import LandmarkMap
+
+app = typer.Typer(no_args_is_help=True, help=__doc__)
+
+Database = Annotated[Path, typer.Argument(metavar="MAP.db", help="Landmark database (SQLite file).")]
+Form = Annotated[
+    str | None,
+    typer.Option("--format", metavar="thesis|csv|json", help="By default what FILE's name says: .txt, .csv, .json."),
+]
+Replace = Annotated[bool, typer.Option("--force", help="Replace an existing file.")]
+
+
+@app.command("import")
+def import_file(
+    database: Database,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Landmarks: the thesis's Appendix C, CSV or JSON.")],
+    form: Form = None,
+    force: Replace = False,
+) -> None:
+    """Make the landmark database MAP.db from FILE."""
+    from mcap_landmarks.maps.database import write_map
+    from mcap_landmarks.maps.exchange import import_map
+
+    _check_new(database, force=force)
+    landmark_map = import_map(file, _format(file, form))
+    write_map(database, landmark_map)
+    say(f"{database}: {_size(landmark_map)}")
+
+
+@app.command("export")
+def export_file(
+    database: Database,
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Where to write.")],
+    form: Form = None,
+    force: Replace = False,
+) -> None:
+    """Write MAP.db to FILE: its groups as Appendix C has them, its landmarks as CSV, or everything as JSON."""
+    from mcap_landmarks.maps.database import read_map
+    from mcap_landmarks.maps.exchange import Format, export_map
+
+    _check_new(file, force=force)
+    landmark_map, chosen = read_map(database), _format(file, form)
+    export_map(file, landmark_map, chosen)
+    say(f"{file}: {_size(landmark_map)}")
+    tentative = int(landmark_map.tentative.sum())
+    if chosen is Format.CSV and tentative:
+        warn(f"note: {tentative} tentative landmarks are left out; JSON holds them")
+    lone = len(landmark_map) - len({identity for group in landmark_map.groups for identity in group.landmark_ids})
+    if chosen is Format.THESIS and lone:
+        warn(f"note: {lone} landmarks in no group are left out; CSV and JSON hold them")
+
+
+@app.command()
+def show(database: Database, json: options.Json = False) -> None:
+    """Print the landmarks, groups and sources of MAP.db."""
+    from mcap_landmarks.maps.database import read_map
+    from mcap_landmarks.maps.exchange_json import document
+
+    landmark_map = read_map(database)
+    if json:
+        content = document(landmark_map)
+        del content["schema"]
+        say_json("landmarks", content)
+    else:
+        _print(database, landmark_map)
+
+
+def _print(database: Path, landmark_map: "LandmarkMap") -> None:
+    import numpy as np
+
+    say(f"{database}: {_size(landmark_map)} in frame {landmark_map.frame}")
+    for source in landmark_map.sources:
+        used = f", {source.used} of {source.bundles} bundles used" if source.kind == "recording" else ""
+        say(f"from {source.kind} {source.fingerprint[:12]}{used}")
+    sigma_m = np.sqrt(np.linalg.eigvalsh(landmark_map.covariances)[:, -1]) if len(landmark_map) else np.zeros(0)
+    rows = [
+        [
+            identity,
+            landmark_map.classes[i] + (" (tentative)" if landmark_map.tentative[i] else ""),
+            *(f"{value:.4f}" for value in landmark_map.positions_xy[i]),
+            f"{sigma_m[i]:.4f}" if sigma_m[i] > 0 else "-",
+            f"{landmark_map.radii_m[i]:.3f}" if landmark_map.radii_m[i] > 0 else "-",
+            str(landmark_map.sightings[i]),
+        ]
+        for i, identity in enumerate(landmark_map.ids)
+    ]
+    say()
+    table(["id", "class", "x [m]", "y [m]", "sigma [m]", "radius [m]", "sightings"], rows)
+    if landmark_map.groups:
+        say()
+        groups = [
+            [str(number), " ".join(group.landmark_ids), *(f"{value:.4f}" for value in group.map_from_base)]
+            for number, group in enumerate(landmark_map.groups, start=1)
+        ]
+        table(["group", "landmarks, left to right", "x [m]", "y [m]", "heading [rad]"], groups)
+
+
+def _size(landmark_map: "LandmarkMap") -> str:
+    counts = [(len(landmark_map), "landmark"), (len(landmark_map.groups), "group")]
+    return (
+        " and ".join(f"{count} {name}{'' if count == 1 else 's'}" for count, name in counts if count) or "no landmarks"
+    )
+
+
+def _format(file: Path, form: str | None) -> "Format":
+    from mcap_landmarks.errors import UsageError
+    from mcap_landmarks.maps.exchange import Format, format_of
+
+    if form is None:
+        return format_of(file)
+    try:
+        return Format(form.lower())
+    except ValueError:
+        raise UsageError(f"--format {form}: choose {', '.join(Format)}") from None
+
+
+def _check_new(path: Path, *, force: bool) -> None:
+    from mcap_landmarks.errors import UsageError
+
+    if path.exists() and not force:
+        raise UsageError(f"{path} exists; name another file, or replace it with --force")

@@ -1,0 +1,78 @@
+"""The command `mcap-landmarks`: finds the verbs in this folder and loads the one that is asked for."""
+
+import importlib
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mcap_landmarks.cli.console import run_command
+from mcap_landmarks.cli.option_groups import spread
+from mcap_landmarks.errors import UsageError
+
+_NOT_VERBS = {"__init__", "main", "console", "option_groups", "options", "stage_runs"}
+_HELP = "Landmark maps and positions from robot recordings, offline and without ROS."
+
+
+def verbs() -> dict[str, str]:
+    """Every verb and the first line of its file, which is its short help; nothing is imported."""
+    found = {}
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        if path.stem not in _NOT_VERBS:
+            with path.open() as lines:
+                found[path.stem] = lines.readline().strip().strip('"')
+    return found
+
+
+def build(asked: str | None) -> typer.Typer:
+    """The application, with the verb `asked` for loaded and the others known by name and short help only."""
+    app = typer.Typer(
+        name="mcap-landmarks",
+        help=_HELP,
+        no_args_is_help=True,
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback()(_root)
+    for verb, short_help in verbs().items():
+        if verb != asked:
+            app.command(verb, help=short_help)(_stand_in)
+            continue
+        module = importlib.import_module(f"mcap_landmarks.cli.{verb}")
+        if hasattr(module, "app"):
+            app.add_typer(module.app, name=verb, help=short_help)
+        else:
+            settings, command = getattr(module, "context_settings", None), spread(module.command)
+            app.command(verb, help=command.__doc__ or short_help, context_settings=settings)(command)
+    return app
+
+
+def _stand_in() -> None:
+    raise UsageError("name the verb first: mcap-landmarks VERB [OPTIONS]")
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from mcap_landmarks import __version__
+
+        typer.echo(f"mcap-landmarks {__version__}")
+        raise typer.Exit
+
+
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Take the options before the verb."""
+
+
+def run(arguments: list[str] | None = None) -> None:
+    """Run the command line and exit with its code."""
+    given = sys.argv[1:] if arguments is None else arguments
+    asked = next((word for word in given if not word.startswith("-")), None)
+    application: Callable[..., object] = build(asked)
+    sys.exit(run_command(application, given))

@@ -1,0 +1,112 @@
+"""Build a landmark map from logs."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
+from mcap_landmarks.cli.stage_runs import Given, tell, told
+from mcap_landmarks.errors import UsageError
+
+if TYPE_CHECKING:
+    from mcap_landmarks.runs.build_map import MappedLog, MapRun
+    from mcap_landmarks.runs.session import StageRun
+
+
+def command(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP) with odometry.")],
+    map_file: options.MapFile,
+    images: ImageOptions,
+    scans: ScanOptions,
+    given: LogOptions,
+    output: options.MaybeOutput = None,
+    from_reference: Annotated[
+        bool, typer.Option("--from-reference", help="Take the map from LOG's /ground_truth/objects (a surveyed map).")
+    ] = False,
+    prior: Annotated[Path | None, typer.Option("--prior", help="Landmark database to extend and refine.")] = None,
+    extrinsics: options.Extrinsics = None,
+) -> None:
+    """Build one landmark map from LOG...; with -o also write each log with its results.
+
+    Where a log has no scene objects, they are made first, from images and scans.
+    """
+    if from_reference:
+        _from_reference(logs, map_file, given.json)
+        return
+    asked = Given(given, images, scans, {"extrinsics": extrinsics})
+    run = _build(logs, map_file, prior, output, asked)
+    for log in run.logs:
+        tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)
+    if given.json:
+        say_json("map", _document(run, map_file))
+    else:
+        _print(run, map_file)
+    if any(log.outcome.losses for log in run.logs):
+        raise typer.Exit(PARTIAL)
+
+
+def _build(logs: list[Path], map_file: Path, prior: Path | None, output: Path | None, given: Given) -> "MapRun":
+    from mcap_landmarks.runs.build_map import MapTask, build_map
+    from mcap_landmarks.runs.outputs import output_files
+
+    targets = output_files(logs, output) if output else {}
+    return build_map(MapTask(tuple(given.requests(logs)), map_file, targets, prior), progress)
+
+
+def _from_reference(logs: list[Path], map_file: Path, json: bool) -> None:
+    from mcap_landmarks.runs.reference_map import map_from_reference
+
+    if len(logs) != 1:
+        raise UsageError("--from-reference takes one log; name just that one")
+    landmark_map = map_from_reference(logs[0], map_file)
+    if json:
+        say_json(
+            "map", {"database": str(map_file), "landmarks": len(landmark_map), "tentative": 0, "logs": [], "stages": {}}
+        )
+    else:
+        say(f"{map_file}: {len(landmark_map)} surveyed landmarks from {logs[0]}")
+
+
+def _stages(run: "MapRun", log: "MappedLog") -> "list[StageRun]":
+    """What every stage did for a log, its share in the map included."""
+    import dataclasses
+
+    return [*log.stages, dataclasses.replace(run.build, outcome=log.outcome)]
+
+
+def _document(run: "MapRun", map_file: Path) -> dict[str, object]:
+    tentative = int(run.landmark_map.tentative.sum())
+    states: dict[str, str] = {}
+    for log in run.logs:
+        for stage in _stages(run, log):
+            states[stage.stage] = "ran" if "ran" in {stage.state, states.get(stage.stage)} else "reused"
+    return {
+        "database": str(map_file),
+        "landmarks": len(run.landmark_map) - tentative,
+        "tentative": tentative,
+        "logs": [
+            {
+                "path": str(log.recording),
+                "fingerprint": log.fingerprint,
+                "bundles": source.bundles,
+                "used": source.used,
+                **told(_stages(run, log)),
+                "losses": list(log.outcome.losses),
+            }
+            for log, source in zip(run.logs, run.sources, strict=True)
+        ],
+        "stages": states,
+    }
+
+
+def _print(run: "MapRun", map_file: Path) -> None:
+    tentative = int(run.landmark_map.tentative.sum())
+    say(f"{map_file}: {len(run.landmark_map) - tentative} landmarks, {tentative} tentative")
+    rows = [
+        [str(log.recording), str(source.bundles), str(source.used)]
+        for log, source in zip(run.logs, run.sources, strict=True)
+    ]
+    table(["log", "bundles", "used"], rows)

@@ -1,0 +1,120 @@
+"""Options that verbs share, as dataclasses, and how a command takes them: typer knows single options only."""
+
+import dataclasses
+import functools
+import inspect
+from collections.abc import Callable
+from inspect import Parameter
+from typing import TYPE_CHECKING, Any, get_type_hints
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.errors import UsageError
+
+if TYPE_CHECKING:
+    from mcap_landmarks.runs.thinning import Thinning
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class LogOptions:
+    """What every verb takes that runs stages over logs."""
+
+    config_file: options.ConfigFile = None
+    settings: options.Settings = None
+    method: options.Method = None
+    start: options.Start = None
+    end: options.End = None
+    remap: options.Remap = None
+    odom: options.OdometryTopic = None
+    results_only: options.ResultsOnly = False
+    force: options.Force = False
+    json: options.Json = False
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class ImageOptions:
+    """What verbs take that look at images."""
+
+    model: options.Model = None
+    image: options.ImageTopic = None
+    image_rate: options.ImageRate = None
+    every: options.Every = None
+
+    def thinning(self) -> "Thinning":
+        """Which images are left out.
+
+        Raises:
+            UsageError: an option cannot be read.
+        """
+        from mcap_landmarks.runs.thinning import parse_thinning
+
+        return parse_thinning(self.image_rate, self.every)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class ScanOptions:
+    """What verbs take that look at scans."""
+
+    scan: options.ScanTopics = None
+    scan_from: options.ScanFrom = None
+    heights: options.Slice = None
+
+    def topics(self) -> list[str] | None:
+        """The topics to read scans from.
+
+        Raises:
+            UsageError: a topic of scans and one of clouds are given, or more than two.
+        """
+        if self.scan and self.scan_from:
+            raise UsageError("--scan-from takes the place of --scan; to merge a scan and a cloud give both with --scan")
+        if len(self.scan or ()) > 2:
+            raise UsageError(f"--scan {' '.join(self.scan or ())}: two are the most that are merged")
+        return [self.scan_from] if self.scan_from else self.scan
+
+    def settings(self) -> list[str]:
+        """The setting that a slice of a point cloud stands for.
+
+        Raises:
+            UsageError: the heights cannot be read.
+        """
+        if self.heights is None:
+            return []
+        low, colon, high = self.heights.partition(":")
+        try:
+            slice_m = (float(low), float(high)) if colon else (0.0, 0.0)
+        except ValueError:
+            slice_m = (0.0, 0.0)
+        if not slice_m[0] < slice_m[1]:
+            raise UsageError(
+                f"--slice {self.heights}: give two heights in metres, the lower one first, such as 0.1:0.3"
+            )
+        return [f"cluster.slice_m=[{slice_m[0]}, {slice_m[1]}]"]
+
+
+def spread(command: Callable[..., None]) -> Callable[..., None]:
+    """The same command with every group of options among its parameters spread out, behind the command's own."""
+    hints = get_type_hints(command, include_extras=True)
+    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if dataclasses.is_dataclass(hint)}
+    parameters = [
+        parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[name])
+        for name, parameter in inspect.signature(command).parameters.items()
+        if name not in groups
+    ]
+    parameters += [single for group in groups.values() for single in _single(group)]
+
+    @functools.wraps(command)
+    def taking(**given: Any) -> None:  # noqa: ANN401 - what typer read
+        for name, group in groups.items():
+            given[name] = group(**{field.name: given.pop(field.name) for field in dataclasses.fields(group)})
+        command(**given)
+
+    taking.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    taking.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined] # inspect and typer look there
+    return taking
+
+
+def _single(group: Any) -> list[Parameter]:  # noqa: ANN401 - a dataclass type
+    hints = get_type_hints(group, include_extras=True)
+    return [
+        Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default, annotation=hints[field.name])
+        for field in dataclasses.fields(group)
+    ]

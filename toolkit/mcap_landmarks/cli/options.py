@@ -1,0 +1,83 @@
+"""Options that several verbs take, so that they read alike everywhere."""
+
+import re
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mcap_landmarks.errors import UsageError
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of text.")]
+Output = Annotated[
+    Path, typer.Option("-o", "--output", help="Where to write: a file, or a folder for several outputs.")
+]
+MaybeOutput = Annotated[
+    Path | None, typer.Option("-o", "--output", help="Where to write: a file, or a folder for several outputs.")
+]
+MapFile = Annotated[Path, typer.Option("--map", help="Landmark database (SQLite file).")]
+MaybeMapFile = Annotated[Path | None, typer.Option("--map", help="Landmark database (SQLite file).")]
+ResultsOnly = Annotated[bool, typer.Option("--results-only", help="Write the new channels without the input's.")]
+Start = Annotated[
+    str | None,
+    typer.Option("--start", help="First log time: RFC 3339 or integer nanoseconds. What holds then comes along."),
+]
+End = Annotated[str | None, typer.Option("--end", help="Log time to stop before: RFC 3339 or integer nanoseconds.")]
+Remap = Annotated[list[str] | None, typer.Option("--remap", metavar="FROM=TO", help="Read topic FROM as TO.")]
+OdometryTopic = Annotated[str | None, typer.Option("--odom", help="Odometry topic, where the log has several.")]
+ImageTopic = Annotated[str | None, typer.Option("--image", help="Image topic, where the log has several.")]
+ScanTopics = Annotated[
+    list[str] | None, typer.Option("--scan", help="Scan topic, where the log has several; twice for two LiDARs.")
+]
+ScanFrom = Annotated[
+    str | None,
+    typer.Option(
+        "--scan-from",
+        metavar="TOPIC",
+        help="Point cloud to take a slice of as the scan; de-skewed if its points tell their times.",
+    ),
+]
+Slice = Annotated[
+    str | None,
+    typer.Option("--slice", metavar="ZMIN:ZMAX", help="Heights of the slice above the base frame, in metres."),
+]
+ImageRate = Annotated[
+    float | None, typer.Option("--image-rate", metavar="HZ", help="Leave out images that come faster than this.")
+]
+Every = Annotated[
+    str | None,
+    typer.Option("--every", metavar="0.2m,5deg", help="Leave out images until the robot moved or turned so far."),
+]
+Model = Annotated[Path | None, typer.Option("--model", help="Detector: any YOLOv5 export (ONNX).")]
+Names = Annotated[Path | None, typer.Option("--names", help="Class names, one per line, where the model has none.")]
+Extrinsics = Annotated[
+    Path | None, typer.Option("--extrinsics", help="Where the sensors are on the robot, if the log does not say.")
+]
+Force = Annotated[bool, typer.Option("--force", help="Run every stage anew, also where its results are there.")]
+ConfigFile = Annotated[Path | None, typer.Option("--config", help="TOML file with one table per stage.")]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="STAGE.KEY=VALUE", help="One setting; repeatable.")
+]
+Method = Annotated[str | None, typer.Option("--method", help="Sets the method of every stage: default or thesis.")]
+
+
+def time_ns(text: str | None, option: str) -> int | None:
+    """Nanoseconds since the epoch from RFC 3339 (an offset is required) or an integer.
+
+    Raises:
+        UsageError: the text is neither.
+    """
+    if text is None:
+        return None
+    if text.lstrip("-").isdigit():
+        return int(text)
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        moment = None
+    if moment is None or moment.tzinfo is None:
+        raise UsageError(f"{option} {text}: give RFC 3339 with an offset, such as 2026-01-31T12:00:00Z, or nanoseconds")
+    whole = moment.replace(microsecond=0)
+    fraction = re.search(r"[.,](\d+)", text)  # datetime keeps microseconds only
+    return int(whole.timestamp()) * 10**9 + (int(fraction[1].ljust(9, "0")[:9]) if fraction else 0)

@@ -1,0 +1,51 @@
+"""Plot maps and runs: landmarks, paths, positions and their errors."""
+
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.console import PARTIAL, progress, warn
+
+
+class Show(StrEnum):
+    """What a plot shows."""
+
+    MAP = "map"
+    POSITIONS = "positions"
+    ERRORS = "errors"
+
+
+def command(
+    inputs: Annotated[
+        list[Path],
+        typer.Argument(metavar="INPUT...", help="Logs with results, a MAP.db, or results.txt as in Appendix D."),
+    ],
+    output: options.Output,
+    align: Annotated[
+        bool, typer.Option("--align", help="Move estimates by the SE(2) that fits the truth best.")
+    ] = False,
+    show: Annotated[
+        Show, typer.Option("--show", help="The map with its runs, positions beside the truth, or boxes of the errors.")
+    ] = Show.MAP,
+    title: Annotated[str, typer.Option("--title", help="A line above the plot.")] = "",
+) -> None:
+    """Plot INPUT... into one picture (.png, .svg, .pdf): landmarks by class, paths, positions and their errors."""
+    from mcap_landmarks.atomic import atomic_file
+    from mcap_landmarks.report.comparison import errors_figure, positions_figure
+    from mcap_landmarks.report.drawing import gather
+    from mcap_landmarks.report.plots import figure, form_of, save
+
+    form = form_of(output)
+    with progress("read", sum(path.stat().st_size for path in inputs if path.is_file())) as advance:
+        drawing, losses = gather(inputs, aligned=align, progress=advance)
+    draw = {Show.MAP: figure, Show.POSITIONS: positions_figure, Show.ERRORS: errors_figure}[show]
+    with atomic_file(output) as stream:
+        save(partial(draw, drawing, title), stream, form)
+    for loss in losses:
+        warn(f"warning: {loss}")
+    if losses:
+        raise typer.Exit(PARTIAL)

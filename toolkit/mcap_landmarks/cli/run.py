@@ -1,0 +1,65 @@
+"""Run stages over logs, and only those whose results are not there yet."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.console import say, table
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
+from mcap_landmarks.cli.stage_runs import Given, finish, run_over
+from mcap_landmarks.errors import UsageError
+
+if TYPE_CHECKING:
+    from mcap_landmarks.runs.pipeline import LogRun
+
+
+def command(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP).")],
+    stages: Annotated[
+        str, typer.Option("--stages", metavar="NAME,...", help="Stages, such as detect,cluster,fuse,localize.")
+    ],
+    output: options.Output,
+    images: ImageOptions,
+    scans: ScanOptions,
+    given: LogOptions,
+    map_file: options.MaybeMapFile = None,
+    names: options.Names = None,
+    extrinsics: options.Extrinsics = None,
+) -> None:
+    """Run exactly these stages over LOG...; write the input with the results of all stages, earlier ones included."""
+    asked = [name.strip() for name in stages.split(",") if name.strip()]
+    if not asked:
+        raise UsageError("--stages names none; write for example --stages detect,cluster,fuse")
+    files = {"map": map_file, "names": names, "extrinsics": extrinsics}
+    runs = run_over("run", asked, logs, output, Given(given, images, scans, files))
+    finish("run", runs, _document, _print, given.json)
+
+
+def _document(run: "LogRun") -> dict[str, object]:
+    return {
+        "results": {
+            stage.stage: {
+                "bundles": stage.outcome.bundles,
+                "unreadable": stage.outcome.unreadable,
+                "counts": dict(stage.outcome.counts),
+            }
+            for stage in run.stages
+        }
+    }
+
+
+def _print(runs: "list[LogRun]") -> None:
+    for run in runs:
+        say(str(run.output))
+        rows = [
+            [
+                stage.stage,
+                stage.state,
+                str(stage.outcome.bundles),
+                ", ".join(f"{count} {name}" for name, count in stage.outcome.counts.items()),
+            ]
+            for stage in run.stages
+        ]
+        table(["stage", "", "bundles", "results"], rows)

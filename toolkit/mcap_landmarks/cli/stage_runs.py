@@ -1,0 +1,120 @@
+"""What the verbs that run stages over logs share: the runs themselves, notes, documents, exit codes."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from mcap_landmarks.cli.console import PARTIAL, progress, say_json, warn
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
+from mcap_landmarks.cli.options import time_ns
+
+if TYPE_CHECKING:
+    from mcap_landmarks.runs.bundles import Span
+    from mcap_landmarks.runs.pipeline import LogRun
+    from mcap_landmarks.runs.plan import Request
+    from mcap_landmarks.runs.session import StageRun
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """What the options of a verb say about all its logs; `files` are those beside the model, by resource name."""
+
+    options: LogOptions
+    images: ImageOptions = field(default_factory=ImageOptions)
+    scans: ScanOptions = field(default_factory=ScanOptions)
+    files: Mapping[str, Path | None] = field(default_factory=dict)
+
+    def requests(self, logs: Sequence[Path]) -> "list[Request]":
+        """What to do with each log.
+
+        Raises:
+            UsageError: an option cannot be read, or a setting is wrong.
+        """
+        from mcap_landmarks.config import gather
+        from mcap_landmarks.runs.plan import Request
+
+        given, files = self.options, {"model": self.images.model, **self.files}
+        settings = gather(given.config_file, [*(given.settings or []), *self.scans.settings()], given.method)
+        span, thinning = self._span(), self.images.thinning()
+        return [Request(log, settings, files, span, thinning, given.results_only, given.force) for log in logs]
+
+    def _span(self) -> "Span":
+        from mcap_landmarks.inspection.topic_roles import Choice, parse_remaps
+        from mcap_landmarks.runs.bundles import Span
+
+        given, scans = self.options, dict(zip(("scan", "second_scan"), self.scans.topics() or (), strict=False))
+        topics = {"odometry": given.odom, "image": self.images.image, **scans}
+        choice = Choice({role: topic for role, topic in topics.items() if topic}, parse_remaps(given.remap or []))
+        return Span(choice, time_ns(given.start, "--start"), time_ns(given.end, "--end"))
+
+
+def run_over(
+    verb: str, names: Sequence[str], logs: Sequence[Path], output: Path, given: Given, *, lacking: bool = False
+) -> "list[LogRun]":
+    """Run stages over every log; `lacking` puts those before them that a log still lacks."""
+    from mcap_landmarks.runs.outputs import output_files
+    from mcap_landmarks.runs.pipeline import run_stages
+
+    requests = given.requests(logs)
+    targets = output_files(logs, output)
+    return [
+        run_stages(request, targets[request.recording], names, verb, progress, lacking=lacking) for request in requests
+    ]
+
+
+def finish(
+    verb: str,
+    runs: "list[LogRun]",
+    document: "Callable[[LogRun], dict[str, object]]",
+    show: "Callable[[list[LogRun]], None]",
+    json: bool,
+) -> None:
+    """Tell what happened, as one document or text; several logs are listed under `logs`.
+
+    Raises:
+        typer.Exit: source data was unreadable.
+    """
+    for run in runs:
+        tell(run.output, run.stages, run.notes, run.losses)
+    if json:
+        each = [
+            {"output": str(run.output), **document(run), **told(run.stages), "losses": list(run.losses)} for run in runs
+        ]
+        say_json(verb, each[0] if len(each) == 1 else {"logs": each})
+    else:
+        show(runs)
+    if any(run.losses for run in runs):
+        raise typer.Exit(PARTIAL)
+
+
+def tell(path: Path, stages: "Sequence[StageRun]", notes: Sequence[str], losses: Sequence[str]) -> None:
+    """What every stage did and why, what was left out and what was lost, on stderr."""
+    for run in stages:
+        warn(f"{path}: {run.stage} {run.state}: {run.reason}")
+    for note in notes:
+        warn(f"note: {path}: {note}")
+    for reason, count in dropped(stages).items():
+        warn(f"note: {path}: {count} {reason}")
+    for loss in losses:
+        warn(f"warning: {path}: {loss}")
+
+
+def told(stages: "Sequence[StageRun]") -> dict[str, object]:
+    """The part of a document that says what every stage did, and what was left out."""
+    return {
+        "stages": {run.stage: run.state for run in stages},
+        "reasons": {run.stage: run.reason for run in stages},
+        "dropped": dropped(stages),
+    }
+
+
+def dropped(stages: "Sequence[StageRun]") -> dict[str, int]:
+    """What stages left out by rule, in words, with its count; what an earlier stage than the last did names it."""
+    found: dict[str, int] = {}
+    for run in stages:
+        of_stage = "" if run is stages[-1] else f" ({run.stage})"
+        found.update({f"{reason}{of_stage}": count for reason, count in run.outcome.dropped.items()})
+    return found

@@ -1,0 +1,166 @@
+"""The configuration of all stages: a TOML file, single settings, and what they mean for each stage."""
+
+import contextlib
+import dataclasses
+import difflib
+import json
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from mcap_landmarks.errors import ToolkitError, UsageError
+from mcap_landmarks.resources import detector
+from mcap_landmarks.sources import find_source, source_names
+from mcap_landmarks.stage import Stage
+from mcap_landmarks.stages import find_stage, stage_names
+
+Settings = dict[str, dict[str, Any]]
+
+
+def gather(file: Path | None, settings: Sequence[str], method: str | None) -> Settings:
+    """Settings by stage or source from a TOML file, then `STAGE.KEY=VALUE` texts over it.
+
+    `method` counts for every stage.
+
+    Raises:
+        UsageError: the file or a setting cannot be read, or names what does not exist, or a value does not fit.
+    """
+    gathered: Settings = _from_file(file) if file else {}
+    for text in settings:
+        _merge(gathered, _from_text(text))
+    for name, table in gathered.items():
+        _known(name, (*stage_names(), *source_names()), "stage or source")
+        made = declaration(name)
+        stage_config(made.config, name, {key: value for key, value in table.items() if key not in made.files})
+    if method is not None:
+        for stage in stage_names():
+            gathered.setdefault(stage, {}).setdefault("method", method)
+    return gathered
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration:
+    """What can be configured of a stage or source: its dataclass, and the files that it takes."""
+
+    config: type[Any]
+    files: tuple[str, ...] = ()
+
+
+def declaration(name: str) -> Declaration:
+    """The declaration of a stage or source by name."""
+    if name in source_names():
+        return Declaration(find_source(name).config)
+    stage = find_stage(name)
+    files = (*stage.resources, *stage.options) if isinstance(stage, Stage) else ()
+    return Declaration(stage.config, files)
+
+
+_WORDS = {"tuple_type": 'give a list, such as ["person", "suitcase"] or [0.1, 0.3]'}
+"""What pydantic says in terms of Python, in terms of TOML."""
+
+
+def _from_file(path: Path) -> Settings:
+    try:
+        tables = tomllib.loads(path.read_text())
+    except FileNotFoundError as error:
+        raise UsageError(f"{path}: there is no such configuration file; check the path") from error
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path}: not a TOML file: {error}") from error
+    for name, table in tables.items():
+        if not isinstance(table, dict):
+            raise UsageError(f"{path}: {name} stands outside a stage's table; write it below a line such as [localize]")
+    return tables
+
+
+def _from_text(text: str) -> Settings:
+    """Settings of one text; a value that is no TOML is taken for a string."""
+    name, equals, value = text.partition("=")
+    for written in (value, json.dumps(value)):
+        with contextlib.suppress(tomllib.TOMLDecodeError):
+            tables = tomllib.loads(f"{name} = {written}")
+            if equals and all(isinstance(table, dict) for table in tables.values()):
+                return tables
+    raise UsageError(f"--set {text}: write STAGE.KEY=VALUE, such as localize.max_sigma_m=0.3")
+
+
+def _merge(into: dict[str, Any], other: Mapping[str, Any]) -> None:
+    for key, value in other.items():
+        if isinstance(value, dict) and isinstance(into.get(key), dict):
+            _merge(into[key], value)
+        else:
+            into[key] = value
+
+
+def stage_config(config: type[Any], stage: str, settings: Mapping[str, Any]) -> Any:
+    """The configuration of one stage: its defaults with the settings over them.
+
+    Raises:
+        UsageError: an unknown key (the nearest known one is named) or a value that does not fit.
+    """
+    for key in settings:
+        _known(key, [field.name for field in dataclasses.fields(config)], f"setting of {stage}")
+    try:
+        made = TypeAdapter(config).validate_python(dict(settings))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join([stage, *(str(part) for part in first["loc"])])
+        raise UsageError(f"{where} = {first['input']!r}: {_WORDS.get(first['type'], first['msg'])}") from error
+    _all_taken(settings, effective(made), stage)
+    return made
+
+
+def _all_taken(given: Any, made: Any, where: str) -> None:
+    """Refuse what is given below the first level and is nowhere in what was made of it."""
+    if isinstance(given, Mapping) and isinstance(made, Mapping):
+        for key, value in given.items():
+            _known(key, made, f"setting of {where}")
+            _all_taken(value, made[key], f"{where}.{key}")
+    elif isinstance(given, list) and isinstance(made, list | tuple):
+        for i, (one, other) in enumerate(zip(given, made, strict=False)):
+            _all_taken(one, other, f"{where}.{i}")
+
+
+def effective(config: Any) -> dict[str, Any]:
+    """Every key with its value, for the manifest."""
+    return dataclasses.asdict(config)
+
+
+def load_files(stage: Stage, settings: Settings, given: Mapping[str, Path | None]) -> tuple[Any, dict[str, Path]]:
+    """The configuration of a stage, and its files: `given` ones, else those that the settings name, such as
+    `detect.model`. Files are no part of the configuration, so that no path gets into a manifest.
+
+    Raises:
+        UsageError: a file that the stage cannot do without is not given.
+    """
+    own, kinds = dict(settings.get(stage.name, {})), declaration(stage.name).files
+    files = {name: Path(str(own.pop(name))) for name in kinds if name in own}
+    files.update({name: path for name, path in given.items() if path is not None and name in kinds})
+    for name in stage.resources:
+        if name not in files:
+            files[name] = _bundled(stage.name, name)
+    return stage_config(stage.config, stage.name, own), files
+
+
+def _bundled(stage: str, name: str) -> Path:
+    """The file that travels with the program, where the user gives none."""
+    if (stage, name) == ("detect", "model"):
+        with contextlib.suppress(ToolkitError):
+            return detector()
+    raise UsageError(f"{stage} needs a {name} and none is bundled; give --{name} FILE or --set {stage}.{name}=FILE")
+
+
+def load(name: str, settings: Settings) -> Any:
+    """The configuration of a stage by name."""
+    return stage_config(find_stage(name).config, name, settings.get(name, {}))
+
+
+def _known(name: str, names: Iterable[str], kind: str) -> None:
+    known = sorted(names)
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+        raise UsageError(f"{name} is no {kind}; {hint}")

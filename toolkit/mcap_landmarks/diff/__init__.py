@@ -1,0 +1,1 @@
+"""Two runs, or two maps, held against each other."""

@@ -1,0 +1,134 @@
+"""What two recordings say about themselves: how they were made, and what they hold."""
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from mcap_landmarks.diff.logs import shared_layout
+from mcap_landmarks.manifest import RUN
+from mcap_landmarks.recording.reader import Recording
+from mcap_landmarks.stage import Connection
+
+Row = dict[str, Any]
+_FOLLOWS = re.compile(r"content|carried(\..*)?|options\.logs|stages\.[^.]*\.(key|outcome|inputs|resources|code)(\..*)?")
+
+
+def manifest_rows(baseline: Mapping[str, str], candidate: Mapping[str, str]) -> list[Row]:
+    """What was meant to differ: each entry of the manifests that does, but for those that follow from others."""
+    rows = rows_of(_entries(baseline), _entries(candidate))
+    return [row for row in rows if not _FOLLOWS.fullmatch(row["key"])]
+
+
+def _code(stages: object) -> str | None:
+    """The version or versions of the program that the stages of a manifest ran with."""
+    if not isinstance(stages, dict):
+        return None
+    return (
+        " and ".join(sorted({str(entry.get("code")) for entry in stages.values() if isinstance(entry, dict)})) or None
+    )
+
+
+def rows_of(baseline: Mapping[str, object], candidate: Mapping[str, object]) -> list[Row]:
+    """One row per key whose values differ; a key that a side lacks has None there."""
+    keys = sorted({*baseline, *candidate})
+    return [
+        {"key": key, "baseline": baseline.get(key), "candidate": candidate.get(key)}
+        for key in keys
+        if baseline.get(key) != candidate.get(key)
+    ]
+
+
+def structure_rows(baseline: Recording, candidate: Recording) -> list[Row]:
+    """Channels that only one has, whose type, definition or number of messages differs; metadata and attachments."""
+    mine, theirs = by_topic(baseline), by_topic(candidate)
+    counts = _message_counts(baseline), _message_counts(candidate)
+    rows = []
+    for topic in sorted({*mine, *theirs}):
+        types = [sorted({c.message_type for c in side.get(topic, ())}) for side in (mine, theirs)]
+        names = [" and ".join(side) or None for side in types]
+        if not all(types):
+            rows.append(_row("channel", topic, *names))
+            continue
+        if types[0] != types[1]:
+            rows.append(_row("type", topic, *names))
+        elif _undecided((*mine[topic], *theirs[topic])):
+            rows.append(_row("definition", topic, *(_digest(side[topic]) for side in (mine, theirs))))
+        number = counts[0].get(topic), counts[1].get(topic)
+        if number[0] != number[1]:
+            rows.append(_row("messages", topic, *number))
+    rows += [
+        _row("metadata", row["key"], row["baseline"], row["candidate"])
+        for row in rows_of(*(_other_metadata(recording) for recording in (baseline, candidate)))
+    ]
+    rows += [
+        _row("attachment", row["key"], row["baseline"], row["candidate"])
+        for row in rows_of(*(_attachments(recording) for recording in (baseline, candidate)))
+    ]
+    return rows
+
+
+def by_topic(recording: Recording) -> dict[str, tuple[Connection, ...]]:
+    """The connections of each topic."""
+    return {topic: recording.connections(topic) for topic in {entry.connection.topic for entry in recording.channels}}
+
+
+def _row(what: str, name: str, baseline: object, candidate: object) -> Row:
+    return {"what": what, "name": name, "baseline": baseline, "candidate": candidate}
+
+
+def _entries(record: Mapping[str, str]) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for key, text in record.items():
+        try:
+            value = json.loads(text)
+        except ValueError:
+            value = text  # somebody else's manifest
+        _flatten(key, value, found)
+        if key == "stages" and (code := _code(value)):
+            found["code"] = code
+    return found
+
+
+def _flatten(key: str, value: object, into: dict[str, object]) -> None:
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            _flatten(f"{key}.{name}", inner, into)
+    else:
+        into[key] = value
+
+
+def _undecided(connections: tuple[Connection, ...]) -> bool:
+    """Whether connections of one type describe it in different words, and not even with the same meaning."""
+    texts = {(connection.schema, connection.schema_encoding, connection.message_encoding) for connection in connections}
+    return len(texts) > 1 and shared_layout(connections) is None
+
+
+def _digest(connections: tuple[Connection, ...]) -> str:
+    texts = sorted(connection.schema for connection in connections)
+    return hashlib.sha256(b"".join(texts)).hexdigest()[:16]
+
+
+def _message_counts(recording: Recording) -> dict[str, int]:
+    counts: dict[str, int] = {}
+    for entry in recording.channels:
+        counts[entry.connection.topic] = counts.get(entry.connection.topic, 0) + entry.count
+    return counts
+
+
+def _other_metadata(recording: Recording) -> dict[str, object]:
+    return {
+        f"{name}.{key}": value
+        for name, entries in recording.metadata.items()
+        if name != RUN
+        for key, value in entries.items()
+    }
+
+
+def _attachments(recording: Recording) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for attachment in recording.attachments():
+        digest = hashlib.sha256(attachment.data).hexdigest()[:16]
+        found[attachment.name] = f"{len(attachment.data)} bytes, {digest}"
+    return found

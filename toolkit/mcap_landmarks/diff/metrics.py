@@ -1,0 +1,65 @@
+"""The figures of two runs side by side, each against the truth."""
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.evaluation.metrics import NOWHERE, Outcome, Reference, evaluate
+from mcap_landmarks.evaluation.read import read_reference, read_run
+from mcap_landmarks.evaluation.trajectory import interpolated
+from mcap_landmarks.maps.map_message import scene_from_map
+from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.messages.match import Status
+
+_PAIRING = partial(interpolated, max_gap_ns=500_000_000)  # as evaluate's
+
+
+def metric_names() -> list[str]:
+    """Every figure that there can be, by its dotted name."""
+    nothing = scene_from_map(LandmarkMap.surveyed((), (), [], Source("reference", "none")), 0)
+    statuses = {status.name.lower(): 0 for status in Status}
+    document = evaluate(Outcome(NOWHERE, 0, 0, statuses, nothing), Reference(NOWHERE, nothing), _PAIRING)
+    return [name for name in _flat(document) if name != "alignment"]
+
+
+def metric_rows(
+    baseline: Path, candidate: Path, reference: Path | None = None, *, same_recording: bool = False
+) -> tuple[dict[str, dict[str, float | None]], list[str]]:
+    """The figures of both by name, and what could not be read; no figures unless both have truth and can be evaluated.
+
+    What truth a side lacks it takes from the other, if they are runs of the same recording, else from `reference`.
+
+    Raises:
+        RecordingError: the reference cannot be read or holds no truth.
+    """
+    known, lost = read_reference(reference) if reference else (Reference(), [])
+    losses = [f"{reference}: {loss}" for loss in lost]
+    try:
+        (mine, truth, lost), (theirs, other, more) = read_run(baseline), read_run(candidate)
+    except RecordingError:  # poses that are not finite, results of other types: the fields tell, figures cannot
+        return {}, losses
+    if same_recording:
+        truth, other = truth.over(other), other.over(truth)
+    truth, other = truth.over(known), other.over(known)
+    losses += [f"{baseline}: {loss}" for loss in lost] + [f"{candidate}: {loss}" for loss in more]
+    if any(side.trajectory is None and side.objects is None for side in (truth, other)):
+        return {}, losses
+    left, right = (_flat(evaluate(run, side, _PAIRING)) for run, side in ((mine, truth), (theirs, other)))
+    rows = {}
+    for name in {**left, **right}:
+        values = left.get(name), right.get(name)
+        delta = values[1] - values[0] if values[0] is not None and values[1] is not None else None
+        if values != (None, None):
+            rows[name] = {"baseline": values[0], "candidate": values[1], "delta": delta}
+    return rows, losses
+
+
+def _flat(document: Mapping[str, object], prefix: str = "") -> dict[str, float | None]:
+    found: dict[str, float | None] = {}
+    for key, value in document.items():
+        if isinstance(value, Mapping):
+            found.update(_flat(value, f"{prefix}{key}."))
+        elif value is None or isinstance(value, int | float):
+            found[prefix + key] = value
+    return found

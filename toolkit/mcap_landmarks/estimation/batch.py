@@ -1,0 +1,135 @@
+"""Levenberg-Marquardt on a batch of pose problems: thousands of small ones at once, with their covariance."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.estimation import robust
+from mcap_landmarks.estimation.linearise import Linearised, Observations, Poses, choose, linearise, select
+from mcap_landmarks.estimation.symmetric import factor3, inverse3, solve3
+
+Array = NDArray[np.float64]
+Prepare = Callable[[slice | NDArray[np.int64]], tuple[Observations, Poses, NDArray[np.bool_]]]
+
+# Observations solved together: their arrays stay in a core's cache.
+_CHUNK = 24576
+# A step shorter than this share of a standard deviation, squared, is the last one.
+_CONVERGED = 1e-6
+_FIRST_DAMPING = 1e-3
+# Nearly all converge within so many steps; the others are gathered and solved apart.
+_QUICK = 4
+
+
+@dataclass(frozen=True, slots=True)
+class PoseSolutions:
+    """B solved poses: `map_from_base` (B, 3) as x, y, heading, covariance (B, 3, 3) in the map frame, and the fit.
+
+    `chi2` (B,) sums the squared Mahalanobis distances `observation_chi2` (B, K), `dof` (B,) is what it should be near,
+    `weights` (B, K) what the robust loss left of each observation (0 where there is none). Where geometry or number of
+    observations leaves the pose open, the covariance's diagonal is infinite and `converged` (B,) is False.
+    """
+
+    map_from_base: Array
+    covariance: Array
+    chi2: Array
+    dof: NDArray[np.int64]
+    weights: Array
+    observation_chi2: Array
+    converged: NDArray[np.bool_]
+
+    @classmethod
+    def empty(cls, count: int, width: int) -> Self:
+        """Room for so many problems of so many observations."""
+        return cls(
+            np.empty((count, 3)),
+            np.empty((count, 3, 3)),
+            np.empty(count),
+            np.empty(count, dtype=np.int64),
+            np.empty((count, width)),
+            np.empty((count, width)),
+            np.empty(count, dtype=np.bool_),
+        )
+
+
+def solve_batch(
+    prepare: Prepare, count: int, width: int, *, numbers: int, robust_dof: float | None, max_iterations: int
+) -> PoseSolutions:
+    """Solve `count` problems of up to `width` sightings of one or two `numbers` each (range, bearing).
+
+    `prepare` gives some problems' observations (K, B), start poses, and which observations (K, B) count.
+    """
+    out = PoseSolutions.empty(count, width)
+    rows, size = np.arange(count), max(_CHUNK // max(width, 1), 1)
+    for iterations in (_QUICK, max_iterations):
+        for start in range(0, len(rows), size):
+            part = rows[start : start + size] if len(rows) < count else slice(start, start + size)
+            with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is left out
+                seen, start_poses, used = prepare(part)
+            poses, converged = _minimise(seen, start_poses, robust_dof, iterations)
+            fit = linearise(seen, poses, robust_dof, newton=False)
+            _write(out, part, poses, converged, fit, used, robust_dof)
+            out.dof[part] = np.maximum(numbers * used.sum(axis=0) - 3, 0)
+        rows = np.flatnonzero(~out.converged)
+    return out
+
+
+def _minimise(
+    seen: Observations, start: Poses, robust_dof: float | None, max_iterations: int
+) -> tuple[Poses, NDArray[np.bool_]]:
+    """Levenberg-Marquardt on all problems, undamped while steps help; solved ones leave. Poses, and who got there."""
+    result = Poses(*(a.copy() for a in start))
+    converged = np.zeros(len(start.x), dtype=np.bool_)
+    columns = np.arange(len(start.x))
+    poses, fit, damping = start, linearise(seen, start, robust_dof), np.zeros(len(columns))
+    for _ in range(max_iterations):
+        factor = factor3(fit.information, damping)
+        step = solve3(factor, fit.right)
+        trial = poses.moved(step)
+        gain = sum(s * r for s, r in zip(step, fit.right, strict=True))
+        last = (gain < _CONVERGED) & (damping <= _FIRST_DAMPING) & (factor.regular | (damping > 0))
+        for whole, part in zip(result, trial, strict=True):
+            whole[columns] = part
+        converged[columns] = last & factor.regular
+        if last.all():
+            return result, converged
+        if last.any():
+            columns, damping, regular = columns[~last], damping[~last], factor.regular[~last]
+            seen, fit = select(seen, ~last), select(fit, ~last)
+            poses, trial = select(poses, ~last), select(trial, ~last)
+        else:
+            regular = factor.regular
+        trial_fit = linearise(seen, trial, robust_dof)
+        better = trial_fit.cost <= fit.cost * (1 + 1e-9) + 1e-12
+        if not better.all():
+            trial, trial_fit = choose(better, trial, poses), choose(better, trial_fit, fit)
+        poses, fit = trial, trial_fit
+        damping = np.where(better & regular, damping / 10, np.maximum(damping * 10, _FIRST_DAMPING))
+    for whole, part in zip(result, poses, strict=True):
+        whole[columns] = part
+    return result, converged
+
+
+def _write(
+    out: PoseSolutions,
+    part: slice | NDArray[np.int64],
+    poses: Poses,
+    converged: NDArray[np.bool_],
+    fit: Linearised,
+    used: NDArray[np.bool_],
+    robust_dof: float | None,
+) -> None:
+    """Fill one chunk of the result."""
+    factor = factor3(fit.information)
+    out.map_from_base[part] = np.stack([poses.x, poses.y, np.arctan2(poses.sine, poses.cosine)], axis=-1)
+    out.covariance[part] = inverse3(factor)
+    out.chi2[part] = fit.chi2.sum(axis=0)
+    out.observation_chi2[part] = fit.chi2.T
+    out.weights[part] = used.T
+    out.converged[part] = converged & factor.regular
+    if robust_dof is not None:
+        out.weights[part] *= robust.student_weight(fit.chi2.T, robust_dof)
+        factors = [robust.student_covariance_factor(robust_dof, min(1.5 / max(k, 1), 1)) for k in range(len(used) + 1)]
+        out.covariance[part] *= np.array(factors)[used.sum(axis=0), None, None]

@@ -1,0 +1,66 @@
+"""Motions between bundles from odometry, and how far they can be trusted."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.geometry.angles import wrap
+
+Array = NDArray[np.float64]
+
+# Standing still is never known better than this (m, rad); it adds up over all bundles while a robot stands.
+_FLOOR_M, _FLOOR_RAD = 1e-5, 1e-5
+# Wheels roll further off than they slip: variance sideways over variance forwards.
+_SIDEWAYS = 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class OdometryNoise:
+    """Random walk of odometry: standard deviations after one metre of way or one radian of turning.
+
+    The defaults suit a small wheeled robot of unknown quality; `graph.solve_map` estimates the log's own from there.
+    """
+
+    position_per_metre_m: float = 0.05
+    heading_per_metre_rad: float = 0.05
+    heading_per_radian_rad: float = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Motions:
+    """N - 1 motions between N moments: `relative` (N-1, 3) in the frame of the earlier pose, and the way between."""
+
+    relative: Array
+    distance_m: Array
+    turn_rad: Array
+
+
+def motion_covariance(motions: Motions, noise: OdometryNoise) -> Array:
+    """Covariances (N-1, 3, 3) of the relative motions.
+
+    Heading errs evenly along the way, so position errs with it across the chord: a third of its variance, half its
+    covariance (integrals of a random walk).
+    """
+    way = motions.distance_m
+    heading = noise.heading_per_metre_rad**2 * way + noise.heading_per_radian_rad**2 * motions.turn_rad + _FLOOR_RAD**2
+    position = noise.position_per_metre_m**2 * way + _FLOOR_M**2
+    across = np.stack([-motions.relative[:, 1], motions.relative[:, 0]], axis=-1)
+    length = np.maximum(np.hypot(across[:, 0], across[:, 1]), 1e-12)
+    # Position errs by the whole variance along the chord and by a part of it across, which the heading adds to.
+    less = heading / 3 - (1 - _SIDEWAYS) * position / length**2
+    out = np.zeros((len(way), 3, 3))
+    out[:, :2, :2] = position[:, None, None] * np.eye(2) + less[:, None, None] * across[:, :, None] * across[:, None]
+    out[:, :2, 2] = out[:, 2, :2] = (heading / 2)[:, None] * across
+    out[:, 2, 2] = heading
+    return out
+
+
+def dead_reckoning(start: Array, motions: Motions) -> Array:
+    """Poses (N, 3) that follow `start` (3,) by the motions."""
+    heading = start[2] + np.concatenate([[0.0], np.cumsum(motions.relative[:, 2])])
+    c, s = np.cos(heading[:-1]), np.sin(heading[:-1])
+    x, y = motions.relative[:, 0], motions.relative[:, 1]
+    steps = np.stack([c * x - s * y, s * x + c * y], axis=-1)
+    xy = start[:2] + np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    return np.concatenate([xy, wrap(heading)[:, None]], axis=1)

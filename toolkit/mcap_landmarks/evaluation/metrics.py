@@ -1,0 +1,115 @@
+"""The evaluation of a run: what it localized, how far off, and how good its map is."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mcap_landmarks.evaluation.alignment import fit
+from mcap_landmarks.evaluation.landmark_metrics import landmark_figures
+from mcap_landmarks.evaluation.pose_metrics import (
+    align,
+    axis_figures,
+    false_figures,
+    heading_figures,
+    nees,
+    pose_errors,
+    position_figures,
+    relative_pose_error,
+)
+from mcap_landmarks.evaluation.trajectory import Indices, Pairs, Trajectory
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.messages.scene import SceneObjects
+
+Pairing = Callable[[Trajectory, Trajectory], Pairs]
+NOWHERE = Trajectory.of(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What a run gave: poses, bundles in all and by status, the map it used or made; None where it has none.
+
+    eligible: how many of the bundles hold two distinct objects or more. seen: ids of the matched landmarks by time.
+    continuous: whether the poses are one path rather than each of its own.
+    """
+
+    trajectory: Trajectory
+    bundles: int
+    eligible: int | None = None
+    statuses: Mapping[str, int] | None = None
+    landmarks: SceneObjects | None = None
+    seen: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
+    continuous: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reference:
+    """The truth: the robot's poses and the objects of its world, None where unknown."""
+
+    trajectory: Trajectory | None = None
+    objects: SceneObjects | None = None
+
+    def over(self, other: "Reference") -> "Reference":
+        """This truth, and what it lacks from another."""
+        return Reference(self.trajectory or other.trajectory, self.objects or other.objects)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScoredPoses:
+    """K estimated poses that have a reference (K, 3), after the alignment if there is one.
+
+    rows (K,) are their places in the estimate, reference_from_estimate (3,) is the fit that was applied, or None.
+    """
+
+    rows: Indices
+    estimate: Array
+    covariances: Array
+    reference: Array
+    reference_from_estimate: Array | None
+
+
+def score(estimate: Trajectory, reference: Reference, pairing: Pairing, *, aligned: bool) -> ScoredPoses:
+    """Pair poses with the reference in time; `aligned` moves them by the one SE(2) that fits their positions best."""
+    rows, truth = pairing(estimate, reference.trajectory or NOWHERE)
+    poses, covariances = estimate.poses[rows], estimate.covariances[rows]
+    transform = None
+    if aligned:
+        transform = fit(poses[:, :2], truth[:, :2])
+        poses, covariances = align(transform, poses, covariances)
+    return ScoredPoses(rows, poses, covariances, truth, transform)
+
+
+def evaluate(outcome: Outcome, reference: Reference, pairing: Pairing, *, aligned: bool = False) -> dict[str, object]:
+    """The document of `evaluate --json` (schemas/json/evaluate.schema.json).
+
+    Figures are over scored poses: those that have a reference; figures and shares of nothing are None.
+    """
+    scored = score(outcome.trajectory, reference, pairing, aligned=aligned)
+    errors = pose_errors(scored.estimate, scored.reference)
+    landmarks, objects = outcome.landmarks, reference.objects
+    return {
+        "bundles": outcome.bundles,
+        "eligible": outcome.eligible,
+        "localized": len(outcome.trajectory) if outcome.statuses is None else outcome.statuses["localized"],
+        "scored": len(errors),
+        "statuses": outcome.statuses,
+        "false": false_figures(errors),
+        "position": position_figures(errors),
+        "axis": {
+            "x": axis_figures(errors[:, 0], scored.reference[:, 0]),
+            "y": axis_figures(errors[:, 1], scored.reference[:, 1]),
+        },
+        "heading": heading_figures(errors[:, 2]),
+        "nees": nees(errors, scored.covariances),
+        "rpe": relative_pose_error(scored.estimate, scored.reference),
+        "map": None if landmarks is None or objects is None else landmark_figures(landmarks, objects),
+        "alignment": alignment_document(scored.reference_from_estimate),
+    }
+
+
+def alignment_document(transform: Array | None) -> dict[str, float] | None:
+    """The field `alignment` of a document: a transform (3,) in metres and degrees, or None."""
+    if transform is None:
+        return None
+    x_m, y_m, heading_rad = transform.tolist()
+    return {"x_m": x_m, "y_m": y_m, "heading_deg": float(np.degrees(heading_rad))}

@@ -1,0 +1,1 @@
+"""Detections and clusters to objects: association, class beliefs, tracks."""

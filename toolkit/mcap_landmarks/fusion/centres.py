@@ -1,0 +1,74 @@
+"""Where the objects in a scan are if they are of a class: their centres, and how well the scan fits that."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mcap_landmarks.fusion.box_geometry import Sights, View
+from mcap_landmarks.fusion.sizes import Size
+from mcap_landmarks.geometry.angles import wrap
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.messages.scan_objects import ScanObjects
+
+SURFACE = ""
+"""The hypothesis of no known shape: the middle of the near surface."""
+
+_LEAST_FIT = 1e-3
+_RADIUS_ERROR = 0.3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Centres:
+    """Positions (N, 2), covariances (N, 2, 2) and fits (N,) of N objects under one class; a fit is at most 1."""
+
+    positions_xy: Array
+    covariances: Array
+    fits: Array
+
+
+def centres_of(objects: ScanObjects, name: str, radii_m: Array, *, has_shape: bool) -> Centres:
+    """Centres by the class's own most probable shape; without one, of discs of radii (N,) behind the surface.
+
+    A cluster without a hypothesis of a class that has shapes fits none of them.
+    """
+    count = len(objects)
+    positions, covariances, fits = (
+        np.zeros((count, 2)),
+        np.zeros((count, 2, 2)),
+        np.full(count, _LEAST_FIT if has_shape else 1.0),
+    )
+    for i, options in enumerate(objects.hypotheses):
+        row = next((k for k, (known, _) in enumerate(options) if known == name), None)
+        if row is None:
+            positions[i], covariances[i] = _behind(objects.positions_xy[i][-1], objects.covariances[i][-1], radii_m[i])
+        else:
+            positions[i], covariances[i] = objects.positions_xy[i][row], objects.covariances[i][row]
+            fits[i] = fits_of(objects, i)[name]
+    return Centres(positions, covariances, fits)
+
+
+def fits_of(objects: ScanObjects, i: int) -> dict[str, float]:
+    """How well the scan fits each class: the probability of its shapes where only they and the bare surface could be.
+
+    It is very small where hits of several things have run together.
+    """
+    shares: dict[str, float] = {}
+    for name, share in objects.hypotheses[i]:
+        shares[name] = shares.get(name, 0.0) + share
+    bare = shares.pop(SURFACE, 0.0)
+    return {name: max(share / (share + bare), _LEAST_FIT) if share else _LEAST_FIT for name, share in shares.items()}
+
+
+def radii_in_boxes(objects: ScanObjects, view: View, sights: Sights, box: int, size: Size) -> Array:
+    """Radii (N,) of discs that have the objects' surfaces in front and fill the width of one box."""
+    surfaces = np.array([positions[-1] for positions in objects.positions_xy]).reshape(-1, 2)
+    distance = np.hypot(*view.from_camera(surfaces).T)
+    sine = min(float(np.sin(abs(wrap(sights.left[box] - sights.right[box])) / 2)), 0.9)
+    radii: Array = np.minimum(distance * sine / (1 - sine), size.width_m[1] / 2)
+    return radii
+
+
+def _behind(surface_xy: Array, covariance: Array, radius_m: float) -> tuple[Array, Array]:
+    distance = float(np.hypot(*surface_xy))
+    ahead = surface_xy / distance if distance > 0 else np.array([1.0, 0.0])
+    return surface_xy + radius_m * ahead, covariance + (_RADIUS_ERROR * radius_m) ** 2 * np.outer(ahead, ahead)

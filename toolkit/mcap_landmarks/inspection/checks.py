@@ -1,0 +1,252 @@
+"""What will go wrong with a log, and what to do about it: told before hours are spent."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.channels import RESULTS
+from mcap_landmarks.geometry.frames import REMEDY
+from mcap_landmarks.inspection.survey import Returns, Sensor, Survey, connected
+from mcap_landmarks.recording.association import BESIDE_NS, WINDOW_NS
+
+LEAST_HZ = {"image": 1.0, "scan": 2.0, "odometry": 5.0}
+"""Rates below which much is lost between two messages, for a robot that walks."""
+
+_LONG_GAP_NS = 10**9
+_GAP_PERIODS = 10
+"""A gap is told where it is longer than both a second and so many usual periods."""
+_CLOCKS_APART_NS = 100_000_000
+"""Drivers and networks delay messages by less; turning at 1 rad/s, it is 6 degrees already."""
+_OTHER_EPOCH_NS = 5 * 10**9
+"""Stamps that are so far from log times are of another clock, or of a log that was recorded from a played one."""
+_MANY = 0.9
+"""Where fewer of a sensor's messages have a partner, something is wrong with clocks or rates."""
+_LEAST_SCANS = 10
+"""Fewer scans say nothing about which beams never return."""
+_LEAST_BEAMS = 3
+"""Fewer dark beams side by side are dirt or chance, not something in the way."""
+_MOST_SECTORS = 3
+_BASES = ("base_footprint", "base_link")
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """Something about a topic that costs results: `problem` where a verb fails or gives nothing, else `warning`."""
+
+    level: str
+    check: str
+    topic: str
+    text: str
+    remedy: str
+
+
+def check(found: Survey) -> list[Finding]:
+    """Everything that is to be said about a log, problems first."""
+    checks: tuple[Callable[[Survey], Iterator[Finding]], ...] = (
+        _unreadable,
+        _rates,
+        _gaps,
+        _stamps,
+        _clocks,
+        _partners,
+        _frames,
+        _cameras,
+        _beams,
+    )
+    findings = [finding for one in checks for finding in one(found)]
+    return sorted(findings, key=lambda finding: finding.level != "problem")
+
+
+def _unreadable(found: Survey) -> Iterator[Finding]:
+    for topic, count in sorted(found.unreadable.items()):
+        text = f"{count} messages do not fit their type"
+        yield Finding("warning", "messages", topic, text, "check the recorder; what can be read is used")
+
+
+def _rates(found: Survey) -> Iterator[Finding]:
+    for sensor in found.sensors:
+        least, log_ns = LEAST_HZ.get(sensor.role), sensor.times[0]
+        if least is None or len(log_ns) < 2:
+            continue
+        seconds = float(np.median(np.diff(log_ns))) * 1e-9
+        if seconds * least > 1:
+            text = f"{1 / seconds:.2g} Hz is slow for {sensor.role} messages"
+            yield Finding("warning", "rate", sensor.topic, text, f"record at {least:g} Hz or more, or drive slower")
+
+
+def _gaps(found: Survey) -> Iterator[Finding]:
+    for sensor in found.sensors:
+        steps = np.diff(sensor.times[0])
+        if sensor.role == "camera_info" or len(steps) < 2:
+            continue
+        long = np.flatnonzero(steps > max(_LONG_GAP_NS, _GAP_PERIODS * float(np.median(steps))))
+        if not len(long):
+            continue
+        worst = long[np.argmax(steps[long])]
+        text = (
+            f"{len(long)} gap{'s' if len(long) > 1 else ''}, the longest of {steps[worst] * 1e-9:.1f} s after "
+            f"{sensor.log_ns[int(worst)]}"
+        )
+        if sensor.role == "odometry" and steps[worst] > WINDOW_NS:
+            remedy = (
+                "bundles in gaps over 2 s have no odometry; cut the log with --start and --end, or drive there again"
+            )
+        else:
+            remedy = (
+                "nothing is seen there; look for lost messages in the recorder's output, or cut with --start and --end"
+            )
+        yield Finding("warning", "gap", sensor.topic, text, remedy)
+
+
+def _stamps(found: Survey) -> Iterator[Finding]:
+    for sensor in found.sensors:
+        stamp_ns = sensor.times[1]
+        unset, set_ns = int((stamp_ns == 0).sum()), stamp_ns[stamp_ns != 0]
+        if unset:
+            text = f"{unset} of {len(stamp_ns)} stamps are zero"
+            yield Finding(
+                "warning", "stamps", sensor.topic, text, "log times stand in for them; let the driver set them"
+            )
+        back = int((np.diff(set_ns) < 0).sum())
+        if back and sensor.role != "camera_info":
+            text = f"stamps go back {back} times"
+            yield Finding("warning", "stamps", sensor.topic, text, "cut the log where its clock was set, with --start")
+        delay_ns = _delay_ns(sensor)
+        if delay_ns is not None and abs(delay_ns) > _OTHER_EPOCH_NS:
+            text = f"stamps are {_span(delay_ns)} log times"
+            remedy = "--start, --end and lists of times count log times; all sensors must have stamps of one clock"
+            yield Finding("warning", "stamps", sensor.topic, text, remedy)
+
+
+def _clocks(found: Survey) -> Iterator[Finding]:
+    sensed = [sensor for sensor in found.sensors if not sensor.topic.startswith(RESULTS)]  # ours have others' stamps
+    delays = {sensor.topic: delay for sensor in sensed if (delay := _delay_ns(sensor)) is not None}
+    references = [sensor.topic for role in ("odometry", "scan", "image") for sensor in found.of(role)]
+    reference = next((topic for topic in references if topic in delays), None)
+    for topic, delay_ns in delays.items():
+        apart_ns = 0.0 if reference is None else delay_ns - delays[reference]
+        if abs(apart_ns) > _CLOCKS_APART_NS:
+            level = "problem" if abs(apart_ns) > WINDOW_NS else "warning"
+            text = f"against log times its stamps are {_span(apart_ns)} those of {reference}"
+            remedy = (
+                "synchronise the clocks (chrony, PTP) or let one machine stamp both; what moves is misplaced by so much"
+            )
+            yield Finding(level, "clock", topic, text, remedy)
+
+
+def _delay_ns(sensor: Sensor) -> float | None:
+    """How much later than they were whole messages are logged, most often; None where that says nothing of clocks.
+
+    Whether a scan's stamp is that of its first or of its last beam is not told; what explains more counts. Camera
+    information holds until the next comes: it is often latched, or carried over from before a cut.
+    """
+    log_ns, stamp_ns = sensor.times
+    known = stamp_ns != 0
+    if sensor.role == "camera_info" or not known.any():
+        return None
+    delay_ns = float(np.median(log_ns[known] - stamp_ns[known]))
+    return min(delay_ns, delay_ns - sensor.sweep_ns, key=abs)
+
+
+def _span(delay_ns: float) -> str:
+    return f"{abs(delay_ns) * 1e-9:.3g} s {'before' if delay_ns > 0 else 'after'}"
+
+
+def _partners(found: Survey) -> Iterator[Finding]:
+    images, odometry = found.of("image"), found.of("odometry")
+    for sensor in (*found.of("scan"), *found.of("scene_objects")):
+        moments = sensor.moments
+        if not len(moments):
+            continue
+        for others, widest_ns, remedy in (
+            (odometry, WINDOW_NS, "bundles without odometry build no map; check clocks and gaps of odometry"),
+            (
+                images if sensor.role == "scan" else [],
+                BESIDE_NS,
+                "objects get a class from images; record more of them",
+            ),
+        ):
+            for other in others:
+                share = _share_near(moments, other.moments, widest_ns)
+                if share < _MANY:
+                    level = "warning" if share else "problem"
+                    text = (
+                        f"{100 * share:.0f} % of its messages have one of {other.topic} within {widest_ns * 1e-9:g} s"
+                    )
+                    yield Finding(level, "partners", sensor.topic, text, remedy)
+
+
+def _share_near(moments: NDArray[np.int64], others: NDArray[np.int64], widest_ns: int) -> float:
+    if not len(others):
+        return 0.0
+    after = np.clip(np.searchsorted(others, moments), 0, len(others) - 1)
+    before = np.clip(after - 1, 0, None)
+    distance = np.minimum(np.abs(others[after] - moments), np.abs(others[before] - moments))
+    return float((distance <= widest_ns).mean())
+
+
+def _frames(found: Survey) -> Iterator[Finding]:
+    names = {name for edge in found.edges for name in edge}
+    base = next((name for name in (*_BASES, *sorted(found.bases)) if name in names), None)
+    scans = [sensor for sensor in found.of("scan") if sensor.frame]
+    if base is None and scans:
+        base = scans[0].frame
+        if found.edges or base in _BASES:
+            text = f"no transforms lead from {base} to a base frame: the robot is taken to be where the LiDAR is"
+            yield Finding("warning", "frames", scans[0].topic, text, REMEDY)
+        else:
+            text = f"there are no transforms: nothing says where the LiDAR ({base}) sits on the robot"
+            yield Finding("problem", "frames", scans[0].topic, text, REMEDY)
+    reached = connected(found.edges, base or _BASES[0])
+    for sensor in (*(found.of("camera_info") or found.of("image")), *scans):
+        if sensor.frame and sensor.frame not in reached:
+            text = f"no transforms lead from {sensor.frame} to {base or _BASES[0]}"
+            yield Finding("problem", "frames", sensor.topic, text, REMEDY)
+    if not found.of("odometry"):
+        text = "there is no odometry: no map can be built, and localize takes every bundle alone"
+        yield Finding("warning", "frames", "", text, "record it, or name a topic with --odom (poses and /tf do too)")
+
+
+def _cameras(found: Survey) -> Iterator[Finding]:
+    infos = found.of("camera_info")
+    for sensor in found.of("image"):
+        if not infos:
+            text = "no camera_info goes with these images: they cannot be fused with scans"
+            yield Finding("problem", "camera", sensor.topic, text, "record the camera's camera_info topic too")
+    for topic in sorted(found.uncalibrated):
+        text = "the camera is not calibrated: its focal length is zero"
+        yield Finding("problem", "camera", topic, text, "calibrate it, and set its camera_info in the driver")
+
+
+def _beams(found: Survey) -> Iterator[Finding]:
+    for topic, returns in sorted(found.returns.items()):
+        never = returns.counts == 0
+        if returns.scans < _LEAST_SCANS or not never.any():
+            continue
+        if never.all():
+            text = f"no beam returned anything in {returns.scans} scans"
+            remedy = "compare ranges with range_min and range_max: a driver that sets these wrong hides every hit"
+            yield Finding("problem", "beams", topic, text, remedy)
+            continue
+        sectors = [sector for sector in _sectors(never) if sector[1] >= _LEAST_BEAMS]
+        if sectors:
+            longest = sorted(sectors, key=lambda sector: -sector[1])[:_MOST_SECTORS]
+            where = ", ".join(_degrees(sector, returns) for sector in sorted(longest))
+            text = f"{int(never.sum())} of {len(never)} beams never returned anything in {returns.scans} scans: {where}"
+            remedy = "if nothing was there, nothing is wrong; else free the view, or leave it out with cluster.view_deg"
+            yield Finding("warning", "beams", topic, text, remedy)
+
+
+def _sectors(never: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First beam and number of beams of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], never, [False]]).astype(np.int8)))
+    return [(int(first), int(end - first)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _degrees(sector: tuple[int, int], returns: Returns) -> str:
+    first, count = sector
+    angles = returns.angle_min_rad + returns.angle_increment_rad * np.array([first, first + count - 1])
+    low, high = np.rad2deg(angles).round().astype(int)
+    return f"{low} to {high} deg"

@@ -1,0 +1,128 @@
+"""What a log holds: its channels, which roles they play, and which verbs can use it."""
+
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from mcap_landmarks.channels import MAP_POSE, MATCH, POSE, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
+from mcap_landmarks.config import Settings
+from mcap_landmarks.inspection.checks import Finding, check
+from mcap_landmarks.inspection.open_logs import McapLog, OpenLog, open_logs
+from mcap_landmarks.inspection.survey import survey
+from mcap_landmarks.inspection.topic_roles import ROLES, topics_for
+from mcap_landmarks.recording.reader import Recording, open_recording
+from mcap_landmarks.sources import Log
+from mcap_landmarks.stage import Watch
+
+TRUTH, RESULTS = "truth", "results"
+_BY_TOPIC = {
+    TRUTH: (TRUTH_POSE.topic, TRUTH_OBJECTS.topic, TRUTH_DETECTIONS.topic),
+    RESULTS: (MATCH.topic, POSE.topic, MAP_POSE.topic),
+}
+_SOURCES = ("image", "camera_info", "scan")
+NEEDS: Mapping[str, tuple[str, ...]] = {
+    "detect": ("image",),
+    "cluster": ("scan",),
+    "map": ("scene_objects", "odometry"),
+    "localize": ("scene_objects",),
+    "evaluate": (RESULTS, TRUTH),
+}
+"""The roles that each verb cannot do without; scene objects can be made where there are `_SOURCES`."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelInfo:
+    """A topic with one type: messages, their mean rate over the log (None below two), and the role it plays."""
+
+    topic: str
+    message_type: str
+    count: int
+    rate_hz: float | None
+    role: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class LogInfo:
+    """One log. `name` tells the logs of one path apart, `roles` are topics by role, `missing` roles by verb."""
+
+    path: Path
+    name: str
+    profile: str
+    start_ns: int | None
+    end_ns: int | None
+    channels: tuple[ChannelInfo, ...]
+    roles: Mapping[str, list[str]]
+    verbs: tuple[str, ...]
+    missing: Mapping[str, list[str]]
+    losses: tuple[str, ...] = field(default=())
+    findings: tuple[Finding, ...] | None = None
+
+
+def describe(path: Path, settings: Settings, watch: Watch | None = None) -> list[LogInfo]:
+    """The logs at a path: a recording, a bag or a data set; with `watch` all of it is read, and checked.
+
+    Raises:
+        RecordingError: it cannot be read.
+    """
+    with open_logs(path, settings) as logs:
+        described = []
+        for log in logs:
+            if path.is_file() and len(log.parts) == 1 and isinstance(log.parts[0], McapLog):
+                with open_recording(path) as recording:  # also the channels that cannot be converted
+                    losses = [f"{path.name}: {loss}" for loss in recording.losses]
+                    described.append(_describe(log, recording.profile, [recording], losses))
+            else:
+                losses = [*log.losses, *(loss for part in log.parts for loss in part.losses)]
+                described.append(_describe(log, _profile(log), log.parts, losses))
+            if watch is not None:
+                with watch(f"check {log.name}", log.size_bytes) as progress:
+                    findings = check(survey(log, described[-1].roles, progress))
+                described[-1] = replace(described[-1], findings=tuple(findings))
+        return described
+
+
+def _profile(log: OpenLog) -> str:
+    profiles = {part.profile for part in log.parts if isinstance(part, McapLog)}
+    if profiles:
+        return min(profiles)
+    return {"rosbag1": "ros1", "rosbag2": "ros2"}.get(log.source, "")
+
+
+def _describe(log: OpenLog, profile: str, parts: Sequence[Log | Recording], losses: Sequence[str]) -> LogInfo:
+    counts: Counter[tuple[str, str]] = Counter()
+    for part in parts:
+        for entry in part.channels:
+            counts[entry.connection.topic, entry.connection.message_type] += entry.count
+    seconds = (log.end_ns - log.start_ns) * 1e-9 if log.start_ns is not None and log.end_ns is not None else 0.0
+    roles = _roles([key for key, count in counts.items() if count])
+    role_of = {topic: role for role, topics in roles.items() for topic in topics}
+    channels = tuple(
+        ChannelInfo(topic, kind, count, count / seconds if seconds > 0 and count > 1 else None, role_of.get(topic))
+        for (topic, kind), count in sorted(counts.items())
+    )
+    makeable = {"scene_objects"} if all(roles.get(role) for role in _SOURCES) else set()
+    missing = {
+        verb: [role for role in needs if not roles.get(role) and role not in makeable] for verb, needs in NEEDS.items()
+    }
+    return LogInfo(
+        log.path,
+        log.name,
+        profile,
+        log.start_ns,
+        log.end_ns,
+        channels,
+        {role: topics for role, topics in roles.items() if role != RESULTS},
+        tuple(verb for verb, lacks in missing.items() if not lacks),
+        {verb: lacks for verb, lacks in missing.items() if lacks},
+        tuple(losses),
+    )
+
+
+def _roles(present: Collection[tuple[str, str]]) -> dict[str, list[str]]:
+    """Topics by role; truth and results go by their names, everything else by message type."""
+    named = {topic for topics in _BY_TOPIC.values() for topic in topics}
+    others = [(topic, kind) for topic, kind in present if topic not in named]
+    roles = {role.name: topics_for(role, others) for role in ROLES.values() if role.messages}
+    topics = {topic for topic, _ in present}
+    return roles | {name: [topic for topic in known if topic in topics] for name, known in _BY_TOPIC.items()}

@@ -1,0 +1,126 @@
+"""Logs of any format: bags and data sets through their sources, MCAP files through the recording reader."""
+
+import contextlib
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mcap_landmarks.config import Settings, stage_config
+from mcap_landmarks.errors import MessageError
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.recording.writer import RecordingWriter
+from mcap_landmarks.sources import Carried, Log, McapFile, source_of
+from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
+
+
+@dataclass(frozen=True, slots=True)
+class OpenLog:
+    """One log: where it comes from, its parts, and what is known of them before they are read."""
+
+    path: Path
+    name: str
+    source: str
+    config: object
+    parts: tuple[Log, ...]
+    size_bytes: int
+    losses: tuple[str, ...]
+    notes: tuple[str, ...]
+    dropped: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def start_ns(self) -> int | None:
+        """Log time of the first message."""
+        return min((part.start_ns for part in self.parts if part.start_ns is not None), default=None)
+
+    @property
+    def end_ns(self) -> int | None:
+        """Log time of the last message."""
+        return max((part.end_ns for part in self.parts if part.end_ns is not None), default=None)
+
+
+@contextlib.contextmanager
+def open_logs(path: Path, settings: Settings) -> Iterator[Sequence[OpenLog]]:
+    """The logs at a path, each with all its parts.
+
+    Raises:
+        RecordingError: no source knows the path, or it cannot be read.
+        UsageError: a setting of its source is wrong.
+    """
+    source = source_of(path)
+    config = stage_config(source.config, source.name, settings.get(source.name, {}))
+    with source.open(path, config) as found:
+        logs = []
+        for log in found:
+            parts = tuple(McapLog(part) if isinstance(part, McapFile) else part for part in log.parts)
+            dropped = Counter(log.dropped)
+            for part in parts:
+                if isinstance(part, McapLog):
+                    dropped.update(part.dropped)
+            size = log.size_bytes
+            logs.append(OpenLog(path, log.name, source.name, config, parts, size, log.losses, log.notes, dropped))
+        yield logs
+
+
+class McapLog:
+    """An MCAP file as part of a log. It is opened anew for each reading: a bag may have thousands of them.
+
+    Messages of ROS 1 become CDR; what is neither is left out and counted in `dropped`.
+    """
+
+    def __init__(self, file: McapFile) -> None:
+        self._file = file
+        self.dropped: Counter[str] = Counter()
+        with open_recording(file.path) as recording:
+            self.profile, self.metadata = recording.profile, recording.metadata
+            self.start_ns, self.end_ns = recording.start_ns, recording.end_ns
+            self.losses = [f"{file.path.name}: {loss}" for loss in recording.losses]
+            self._carried = [self._carry(entry) for entry in recording.channels]
+        self.channels = [
+            ChannelSummary(carried.connection, entry.count)
+            for carried, entry in zip(self._carried, recording.channels, strict=True)
+            if carried
+        ]
+
+    def _carry(self, entry: ChannelSummary) -> Carried | None:
+        carried = self._file.carry(entry.connection)
+        if carried is None and entry.count:
+            kind = entry.connection.message_encoding or "unknown"
+            self.dropped[f"{entry.connection.topic}: {kind} messages, where ROS 2 needs CDR"] += entry.count
+        return carried
+
+    def messages(
+        self,
+        connections: Collection[Connection] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+        progress: Progress | None = None,
+    ) -> Iterator[RawMessage]:
+        """See `Log`."""
+        with open_recording(self._file.path) as recording:
+            wanted = {
+                entry.connection: carried
+                for entry, carried in zip(recording.channels, self._carried, strict=True)
+                if carried and (connections is None or carried.connection in connections)
+            }
+            for raw in recording.messages(list(wanted), start_ns, end_ns, progress):
+                connection = wanted[raw.connection].connection
+                try:
+                    data = wanted[raw.connection].convert(raw.data)
+                except MessageError as error:
+                    self._lose(f"{connection.topic}: {error}; such messages are left out")
+                    continue
+                yield RawMessage(connection, raw.log_time_ns, raw.publish_time_ns, raw.sequence, data)
+            for loss in recording.losses:
+                self._lose(loss)
+
+    def copy_attachments(self, writer: RecordingWriter) -> None:
+        """Carry the file's attachments over."""
+        with open_recording(self._file.path) as recording:
+            for attachment in recording.attachments():
+                writer.attach(attachment)
+
+    def _lose(self, loss: str) -> None:
+        loss = f"{self._file.path.name}: {loss}"
+        if loss not in self.losses:
+            self.losses.append(loss)

@@ -1,0 +1,180 @@
+"""One look at all sensors of a log, without running anything: times, frames, beams."""
+
+import struct
+from array import array
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.errors import MessageError
+from mcap_landmarks.geometry.frames import plain
+from mcap_landmarks.inspection.open_logs import OpenLog
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.images import CameraInfo
+from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.sources import merge
+from mcap_landmarks.stage import Connection, Progress, RawMessage
+
+SENSORS = ("image", "camera_info", "scan", "odometry", "scene_objects")
+"""The roles that are looked at."""
+
+_MOST_SCANS = 400
+_MOST_TRANSFORMS = 300
+"""So many of a topic are decoded, spread over the log or its first: which beams and frames there are shows soon."""
+_BIG, _LITTLE = struct.Struct(">iI"), struct.Struct("<iI")
+
+
+@dataclass(slots=True)
+class Sensor:
+    """One topic: its role, log times and header stamps (zero where unset) of all messages, and its frame.
+
+    `sweep_ns` is how long after its stamp a message is whole: a scan's stamp is that of its first beam.
+    """
+
+    role: str
+    topic: str
+    log_ns: "array[int]" = field(default_factory=lambda: array("q"))
+    stamp_ns: "array[int]" = field(default_factory=lambda: array("q"))
+    frame: str = ""
+    sweep_ns: int = 0
+
+    @property
+    def times(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Log times and stamps (N,)."""
+        return np.array(self.log_ns, dtype=np.int64), np.array(self.stamp_ns, dtype=np.int64)
+
+    @property
+    def moments(self) -> NDArray[np.int64]:
+        """The times (N,) that messages are associated by, sorted: stamps, log times where those are zero."""
+        log_ns, stamp_ns = self.times
+        return np.sort(np.where(stamp_ns == 0, log_ns, stamp_ns))
+
+
+@dataclass(slots=True)
+class Returns:
+    """How many of the scans that were looked at got anything back from each beam (N,), and where beams point."""
+
+    angle_min_rad: float
+    angle_increment_rad: float
+    counts: NDArray[np.int64]
+    scans: int = 0
+
+
+@dataclass(slots=True)
+class Survey:
+    """What a log's sensors gave. `edges` are parent and child of transforms, `bases` what odometry is of."""
+
+    sensors: list[Sensor] = field(default_factory=list)
+    edges: set[tuple[str, str]] = field(default_factory=set)
+    bases: set[str] = field(default_factory=set)
+    returns: dict[str, Returns] = field(default_factory=dict)
+    uncalibrated: set[str] = field(default_factory=set)
+    unreadable: Counter[str] = field(default_factory=Counter)
+
+    def of(self, role: str) -> list[Sensor]:
+        """The sensors of a role."""
+        return [sensor for sensor in self.sensors if sensor.role == role]
+
+
+def survey(log: OpenLog, roles: Mapping[str, Sequence[str]], progress: Progress | None = None) -> Survey:
+    """Look at a log once; `roles` are topics by role."""
+    found = Survey()
+    sensors = {topic: Sensor(role, topic) for role in SENSORS for topic in roles.get(role, ())}
+    found.sensors = list(sensors.values())
+    entries = [entry for part in log.parts for entry in part.channels]
+    scans = Counter[str]()
+    for entry in entries:
+        scans[entry.connection.topic] += entry.count
+    strides = {topic: -(-count // _MOST_SCANS) for topic, count in scans.items()}
+    wanted = [
+        entry.connection
+        for entry in entries
+        if entry.connection.topic in sensors or entry.connection.message_type == TFMessage.ROS_TYPE
+    ]
+    pieces = [(part.start_ns or 0, partial(part.messages, wanted, None, None, progress)) for part in log.parts]
+    transforms = Counter[Connection]()
+    for raw in merge(pieces):
+        sensor = sensors.get(raw.connection.topic)
+        try:
+            if raw.connection.message_type == TFMessage.ROS_TYPE:
+                _transforms(raw, found, transforms)
+            if sensor is not None:
+                _take(raw, sensor, found, max(strides[sensor.topic], 1))
+        except MessageError:
+            found.unreadable[raw.connection.topic] += 1
+    return found
+
+
+def _transforms(raw: RawMessage, found: Survey, seen: Counter[Connection]) -> None:
+    seen[raw.connection] += 1
+    if seen[raw.connection] <= _MOST_TRANSFORMS or raw.connection.topic.endswith("_static"):
+        for step in decode(TFMessage, raw.data).transforms:
+            found.edges.add((plain(step.frame_id), plain(step.child_frame_id)))
+
+
+def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
+    kind, number = raw.connection.message_type, len(sensor.log_ns)
+    stamp_ns = _first_stamp_ns(raw.data) if kind == TFMessage.ROS_TYPE else _stamp_ns(raw.data)
+    sensor.log_ns.append(raw.log_time_ns)
+    sensor.stamp_ns.append(stamp_ns)
+    if kind == LaserScan.ROS_TYPE and number % stride == 0:
+        _look_at_scan(decode(LaserScan, raw.data), sensor, found.returns)
+    if number or kind == TFMessage.ROS_TYPE:
+        return
+    sensor.frame = plain(_frame(raw.data))
+    if kind == Odometry.ROS_TYPE:
+        found.bases.add(plain(decode(Odometry, raw.data).child_frame_id))
+    elif kind == CameraInfo.ROS_TYPE and not decode(CameraInfo, raw.data).intrinsics[0, 0] > 0:
+        found.uncalibrated.add(sensor.topic)
+
+
+def _first_stamp_ns(data: bytes | memoryview) -> int:
+    transforms = decode(TFMessage, data).transforms
+    return transforms[0].stamp_ns if transforms else 0
+
+
+def _stamp_ns(data: bytes | memoryview) -> int:
+    """The stamp of a message that begins with a header, without decoding the rest."""
+    if len(data) < 12:
+        raise MessageError("it is shorter than a header")
+    seconds, rest = (_LITTLE if data[1] & 1 else _BIG).unpack_from(data, 4)
+    return int(seconds) * 10**9 + int(rest)
+
+
+def _frame(data: bytes | memoryview) -> str:
+    """The frame of a message that begins with a header."""
+    size = int.from_bytes(data[12:16], "little" if data[1] & 1 else "big")
+    return bytes(data[16 : 16 + max(size - 1, 0)]).decode(errors="replace")
+
+
+def _look_at_scan(scan: LaserScan, sensor: Sensor, returns: dict[str, Returns]) -> None:
+    ranges = np.asarray(scan.ranges_m)
+    seconds = max(scan.scan_time_s, scan.time_increment_s * len(ranges))
+    sensor.sweep_ns = round(seconds * 1e9) if np.isfinite(seconds) else 0
+    known = returns.get(sensor.topic)
+    if known is None or len(known.counts) != len(ranges):  # a driver that changes its mind starts anew
+        zeros = np.zeros(len(ranges), dtype=np.int64)
+        known = returns[sensor.topic] = Returns(scan.angle_min_rad, scan.angle_increment_rad, zeros)
+    with np.errstate(invalid="ignore"):
+        known.counts += np.isfinite(ranges) & (ranges >= scan.range_min_m) & (ranges > 0) & (ranges < scan.range_max_m)
+    known.scans += 1
+
+
+def connected(edges: Iterable[tuple[str, str]], start: str) -> set[str]:
+    """The frames that transforms lead to from one, itself included."""
+    neighbours: dict[str, set[str]] = {}
+    for parent, child in edges:
+        neighbours.setdefault(parent, set()).add(child)
+        neighbours.setdefault(child, set()).add(parent)
+    reached, waiting = {start}, [start]
+    while waiting:
+        for name in neighbours.get(waiting.pop(), set()) - reached:
+            reached.add(name)
+            waiting.append(name)
+    return reached

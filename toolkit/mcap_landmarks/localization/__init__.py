@@ -1,0 +1,1 @@
+"""Scene and map to pose: pose candidates, verification, acceptance, decision, tracker."""

@@ -1,0 +1,98 @@
+"""Localize by ranges alone, which leave the heading open and often a mirror image, or by bearings alone."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from scipy.special import chdtri
+
+from mcap_landmarks.estimation.batch import PoseSolutions
+from mcap_landmarks.estimation.bearings import solve_bearings
+from mcap_landmarks.estimation.pose import position_sigma
+from mcap_landmarks.estimation.ranges import PositionSolutions, solve_ranges
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.localization.correspondences import Bools, Given, Problem
+from mcap_landmarks.localization.decision import Match
+from mcap_landmarks.maps.model import LandmarkMap
+from mcap_landmarks.messages.match import LandmarkMatch, Status
+
+LEAST = 3
+"""Objects that a position from ranges or bearings alone needs."""
+# Mirror images so close are one position.
+_SAME_SIGMAS = 3.0
+
+
+class Settings(Protocol):
+    """What of the stage's configuration is used here."""
+
+    @property
+    def max_sigma_m(self) -> float: ...
+    @property
+    def consistency(self) -> float: ...
+    @property
+    def accidental(self) -> float: ...
+
+
+def by_bearings(given: Given, mask: Bools) -> PoseSolutions:
+    """Poses from the bearings that `mask` (B, K) leaves."""
+    variance = given.covariance[..., 1, 1]
+    first = solve_bearings(given.landmarks_xy, given.bearing_rad, variance, mask=mask)
+    distance_m = distances(first.map_from_base, given)
+    # Seen from where the robot is, the landmark's own error is an angle.
+    variance = variance + _landmark_variance(given) / np.maximum(distance_m, 1e-9) ** 2
+    return solve_bearings(given.landmarks_xy, given.bearing_rad, variance, mask=mask)
+
+
+def locate_by_ranges(
+    problems: Sequence[Problem], given: Given, landmark_map: LandmarkMap, settings: Settings
+) -> list[Match]:
+    """Positions without heading of bundles of ranges; where the mirror image fits as well, both are candidates."""
+    variance = given.covariance[..., 0, 0] + _landmark_variance(given)
+    solved = solve_ranges(given.landmarks_xy, given.range_m, variance, mask=given.mask)
+    return [_judge(problem, i, solved, given, landmark_map, settings) for i, problem in enumerate(problems)]
+
+
+def _judge(
+    problem: Problem, i: int, solved: PositionSolutions, given: Given, landmark_map: LandmarkMap, settings: Settings
+) -> Match:
+    both, chi2_of = solved.position_xy[i], solved.chi2[i]
+    position, covariance, dof = both[0], solved.covariance[i, 0], int(solved.dof[i])
+    sigma_m = position_sigma(covariance)
+    odds = np.exp(-(chi2_of - chi2_of[0]) / 2)
+    apart = np.linalg.norm(both[1] - position) > _SAME_SIGMAS * sigma_m
+    status = Status.LOCALIZED
+    if chi2_of[0] > chdtri(max(dof, 1), settings.consistency):
+        status = Status.INCONSISTENT
+    elif sigma_m > settings.max_sigma_m:
+        status = Status.WEAK_GEOMETRY
+    elif apart and odds[1] > settings.accidental:
+        status = Status.AMBIGUOUS
+    k = len(problem.objects)
+    off_m = np.abs(distances(position[None], given.pick(np.array([i])))[0, :k] - given.range_m[i, :k])
+    shown = both if status == Status.AMBIGUOUS else both[:0]
+    match = LandmarkMatch(
+        problem.scene.stamp_ns,
+        problem.scene.frame_id,
+        status,
+        tuple(problem.scene.ids[row] for row in problem.objects),
+        tuple(landmark_map.ids[row] for row in problem.landmarks),
+        off_m,
+        tuple(f"x {x:.3f} m, y {y:.3f} m" for x, y in shown.tolist()),
+        (odds / odds.sum())[: len(shown)],
+        float(odds[1]) if apart else 0.0,
+        float(chi2_of[0]),
+        dof,
+    )
+    return Match(match, np.array([*position, 0.0])) if status == Status.LOCALIZED else Match(match)
+
+
+def distances(poses: Array, given: Given) -> Array:
+    """Distances (B, K) to the landmarks from poses (B, 3) or positions (B, 2)."""
+    distance_m: Array = np.linalg.norm(given.landmarks_xy - poses[:, None, :2], axis=-1)
+    return distance_m
+
+
+def _landmark_variance(given: Given) -> Array:
+    """Variance (B, K) of each landmark in any one direction."""
+    variance: Array = np.trace(given.landmark_covariance, axis1=2, axis2=3) / 2
+    return variance

@@ -1,0 +1,96 @@
+"""Match the bundles of a log one after the other, joined through odometry."""
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, motion_covariance
+from mcap_landmarks.geometry import se2
+from mcap_landmarks.localization.decision import Fix, Match, accepted, refused
+from mcap_landmarks.localization.local_map import Surroundings
+from mcap_landmarks.localization.matching import Matcher, Objects, best_of
+from mcap_landmarks.localization.relocalization import Searcher
+from mcap_landmarks.localization.tracker import Follower
+from mcap_landmarks.localization.verification import UNMATCHED
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.stage import OdometryAt
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class Joiner:
+    """Localizes one log's bundles in their order.
+
+    While the place is unknown, all that was seen over the last `length_m` is matched as one set of objects; when that
+    can hardly be an accident, the robot is followed through the map. Odometry counts as good as `noise` says.
+    """
+
+    def __init__(self, matcher: Matcher, noise: OdometryNoise, length_m: float) -> None:
+        self._matcher, self._noise, self._length_m = matcher, noise, length_m
+        counts = np.bincount(matcher.index.class_of)
+        self._frequency: Array = counts / counts.sum()
+        self._forget()
+
+    def _forget(self) -> None:
+        self._around = Surroundings(self._matcher.density, self._frequency, self._length_m, self._matcher.config)
+        self._searcher = Searcher(self._matcher, self._length_m)
+        self._follower: Follower | None = None
+        self._before: OdometryAt | None = None
+        self._joined: deque[float] = deque()
+
+    def add(self, scene: SceneObjects, odometry: OdometryAt | None) -> Match:
+        """Match the next bundle; without odometry by itself, and what came before is forgotten.
+
+        Raises:
+            MapError: lengths in the scene and in the map differ so much that one has the wrong unit.
+        """
+        if odometry is None:
+            self._forget()
+            return self._matcher.match([scene])[0]
+        objects = self._matcher.objects(scene)
+        self._move(odometry)
+        old = self._around.numbers
+        numbers = self._around.see(objects.points_xy, objects.covariances, objects.probabilities)
+        objects = replace(objects, spurious=self._around.spurious_of(numbers))
+        fresh = ~np.isin(self._around.numbers, old)
+        joined = self._count(scene, odometry.way_m)
+        if self._follower is not None:
+            fix = self._follower.see(objects)
+            if not self._follower.lost:
+                return self._report(scene, objects, fix, joined)
+            self._follower, fresh = None, np.ones_like(fresh)
+        found = self._searcher.search(self._around, fresh)
+        if found is None or found[0].expected_accidental > self._matcher.config.accidental:
+            return refused(scene, self._matcher.index, found[0] if found else None, joined)
+        fix, rows = best_of(found[0]), found[1]
+        self._follower = Follower(self._matcher, fix, self._around.points_xy[rows], self._length_m)
+        landmark_of = dict(zip(self._around.numbers[rows].tolist(), fix.landmarks.tolist(), strict=True))
+        own = np.array([landmark_of.get(number, UNMATCHED) for number in numbers.tolist()], dtype=np.int64)
+        fix = Fix(fix.pose, fix.covariance, own, fix.expected_accidental, fix.chi2, fix.dof)
+        return self._report(scene, objects, fix, joined)
+
+    def _move(self, odometry: OdometryAt) -> None:
+        before, self._before = self._before, odometry
+        if before is None:
+            return
+        step = se2.between(before.odom_from_base, odometry.odom_from_base)
+        way_m = odometry.way_m - before.way_m
+        motion = Motions(step[None], np.array([way_m]), np.array([odometry.turned_rad - before.turned_rad]))
+        covariance = motion_covariance(motion, self._noise)[0]
+        self._around.move(step, covariance, way_m)
+        self._searcher.move(step)
+        if self._follower is not None:
+            self._follower.move(step, covariance, way_m)
+
+    def _count(self, scene: SceneObjects, way_m: float) -> int:
+        if len(scene):
+            self._joined.append(way_m)
+        while self._joined and self._joined[0] < way_m - self._length_m:
+            self._joined.popleft()
+        return max(len(self._joined), 1)
+
+    def _report(self, scene: SceneObjects, objects: Objects, fix: Fix, joined: int) -> Match:
+        return accepted(scene, objects.rows, objects.points_xy, self._matcher.index, fix, self._matcher.config, joined)

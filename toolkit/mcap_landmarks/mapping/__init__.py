@@ -1,0 +1,1 @@
+"""Observations to a map (landmark SLAM): data association, log merging, initialisation, noise, solving."""

@@ -1,0 +1,73 @@
+"""Bring what separate logs mapped into one frame, by the landmarks that they share."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.errors import MapError
+from mcap_landmarks.estimation import closed_form
+from mcap_landmarks.geometry import se2
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_PAIRS = 500
+
+
+def align(points_xy: Array, onto_xy: Array, seed: int = 0) -> Array:
+    """Transform (3,) that brings points (N, 2) onto others (N, 2), N >= 2, right as long as more than half of them fit.
+
+    The pair of points whose transform has the least median distance (Rousseeuw 1984), then all within three times that.
+    """
+    first, second = np.triu_indices(len(points_xy), 1)
+    if len(first) > _PAIRS:
+        drawn = np.random.default_rng(seed).choice(len(first), _PAIRS, replace=False)
+        first, second = first[drawn], second[drawn]
+    pairs = np.stack([first, second])
+    tried = _fit(points_xy[pairs], onto_xy[pairs])
+    moved = se2.transform_points(tried[:, None], points_xy)
+    distance = np.linalg.norm(moved - onto_xy, axis=2)
+    # With the two that made the transform left in, the median must look beyond them.
+    middle = np.sort(distance, axis=1)[:, min(len(points_xy) // 2 + 1, len(points_xy) - 1)]
+    best = int(np.argmin(middle))
+    near = distance[best] <= max(3 * middle[best], 1e-9)
+    return np.asarray(_fit(points_xy[near][:, None], onto_xy[near][:, None])[0])
+
+
+def join(alone: list[tuple[Ints, Array]], known: tuple[Ints, Array] | None) -> tuple[list[Array], Ints, Array]:
+    """Transforms (3,) of each log's landmarks (numbers (L,), positions (L, 2)) into one frame, and all of them in it.
+
+    That frame is the one of the landmarks `known` beforehand, else the first log's. Next comes always the log that
+    shares most landmarks with what is there already.
+
+    Raises:
+        MapError: a log shares fewer than two landmarks with the rest.
+    """
+    transforms: dict[int, Array] = {}
+    if known is None:
+        transforms[0] = np.zeros(3)
+        known = alone[0]
+    there = dict(zip(known[0].tolist(), known[1], strict=True))
+    while len(transforms) < len(alone):
+        waiting = [i for i in range(len(alone)) if i not in transforms]
+        shared = {i: [n for n in alone[i][0].tolist() if n in there] for i in waiting}
+        best = max(waiting, key=lambda i: len(shared[i]))
+        if len(shared[best]) < 2:
+            raise MapError(
+                f"log {best + 1} shares {len(shared[best])} landmarks with the others, but joining takes two; "
+                "map it on its own or add a log that overlaps with both"
+            )
+        place = dict(zip(alone[best][0].tolist(), alone[best][1], strict=True))
+        onto = np.array([there[n] for n in shared[best]])
+        transforms[best] = align(np.array([place[n] for n in shared[best]]), onto)
+        for number, point in place.items():
+            there.setdefault(number, se2.transform_points(transforms[best], point))
+    numbers = np.array(sorted(there), dtype=np.int64)
+    landmarks = np.array([there[n] for n in numbers.tolist()]).reshape(-1, 2)
+    return [transforms[i] for i in range(len(alone))], numbers, landmarks
+
+
+def _fit(points_xy: Array, onto_xy: Array) -> Array:
+    """Transforms (B, 3) that bring points (K, B, 2) onto others (K, B, 2)."""
+    weight = np.ones(points_xy.shape[:2])
+    x, y, c, s = closed_form.fit(onto_xy[..., 0], onto_xy[..., 1], points_xy[..., 0], points_xy[..., 1], weight)
+    return np.stack([x, y, np.arctan2(s, c)], axis=-1)

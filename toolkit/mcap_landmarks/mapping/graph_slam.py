@@ -1,0 +1,188 @@
+"""A landmark map from several logs: poses and landmarks optimised together, robustly, with honest covariances."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.errors import MapError
+from mcap_landmarks.estimation.factor_graph import Graph, Solved, State, minimise
+from mcap_landmarks.estimation.odometry import OdometryNoise
+from mcap_landmarks.geometry import se2
+from mcap_landmarks.mapping.common_frame import join
+from mcap_landmarks.mapping.log_graph import LogNoise, LogSightings, graph_of, solve_alone, vote
+from mcap_landmarks.mapping.variance_components import assumed_noise, estimate_noise, places
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+DEFAULT_ODOMETRY = OdometryNoise()
+_NOISE_ROUNDS = 2
+# 99 % of right sightings lie within this squared distance.
+_INLIER = 9.21
+_COLUMNS_AT_ONCE = 200
+
+
+@dataclass(frozen=True, slots=True)
+class KnownLandmarks:
+    """Landmarks of a map that exists already: numbers (Q,), positions (Q, 2), covariances (Q, 2, 2)."""
+
+    number: Ints
+    xy: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True)
+class MapSolution:
+    """L landmarks: `number` (L,) rising, positions (L, 2), covariance (L, 2, 2), and how many sightings fit it (L,).
+
+    Per log: poses (N, 3), robust weights (M,), and the noise found. A weight near 0 means that a sighting was taken for
+    wrong. Without known landmarks the frame is the first log's, with its first pose as given, and covariances are those
+    of a map free to shift and turn as a whole: what remains between landmarks. `chi2` sums the squared whitened
+    residuals times their weights.
+    """
+
+    number: Ints
+    landmarks_xy: Array
+    covariance: Array
+    sightings: Ints
+    trajectories: tuple[Array, ...]
+    weights: tuple[Array, ...]
+    noise: tuple[LogNoise, ...]
+    chi2: float
+
+
+def solve_map(
+    logs: Sequence[LogSightings],
+    known: KnownLandmarks | None = None,
+    odometry: OdometryNoise = DEFAULT_ODOMETRY,
+    robust_dof: float = 1.0,
+) -> MapSolution:
+    """Optimise the poses of all logs and the landmarks they saw (thesis Algorithm 4's task, as a pose-landmark graph).
+
+    Each log is solved alone, its noise estimated, then all are joined by the landmarks they share. `odometry` is where
+    the estimate of each log's odometry noise starts. `robust_dof`: see `graph_system.minimise`.
+
+    Raises:
+        MapError: no log, a log without a sighting, or one that shares fewer than two landmarks with the others.
+    """
+    if not logs or not all(len(log.pose) for log in logs):
+        raise MapError("a log without a single landmark sighting cannot be mapped; leave it out")
+    alone = [_solve_with_its_noise(log, odometry, robust_dof) for log in logs]
+    parts = [(numbers, solved.state.landmarks_xy) for numbers, solved, _ in alone]
+    transforms, numbers, landmarks = join(parts, None if known is None else (known.number, known.xy))
+    pairs = zip(transforms, alone, strict=True)
+    poses = np.concatenate([se2.compose(transform, solved.state.poses) for transform, (_, solved, _) in pairs])
+    noise = tuple(n for _, _, n in alone)
+    graph = _stack(logs, noise, numbers, known)
+    solved = minimise(graph, State(poses, landmarks), robust_dof)
+    if len(logs) > 1:
+        solved = minimise(graph, _vote_again(logs, graph, solved.state, robust_dof), robust_dof)
+    lengths, counts = [len(log) for log in logs], [len(log.pose) for log in logs]
+    squares = (solved.residuals[0] ** 2).sum(axis=1) * solved.weight
+    return MapSolution(
+        numbers,
+        solved.state.landmarks_xy,
+        _landmark_covariances(solved, free_frame=known is None),
+        _fitting(logs, noise, solved),
+        tuple(np.split(solved.state.poses, np.cumsum(lengths)[:-1])),
+        tuple(np.split(solved.weight, np.cumsum(counts)[:-1])),
+        noise,
+        float(squares.sum() + (solved.residuals[1] ** 2).sum() + (solved.residuals[2] ** 2).sum()),
+    )
+
+
+def _solve_with_its_noise(
+    log: LogSightings, odometry: OdometryNoise, robust_dof: float
+) -> tuple[Ints, Solved, LogNoise]:
+    place = places(log)
+    noise = assumed_noise(place, odometry)
+    numbers, solved = solve_alone(log, noise, robust_dof)
+    rows = np.searchsorted(numbers, log.landmark)
+    for _ in range(_NOISE_ROUNDS):
+        noise = estimate_noise(log, place, noise.odometry, solved)
+        solved = minimise(graph_of(log, rows, noise), solved.state, robust_dof)
+    return numbers, solved, noise
+
+
+def _stack(
+    logs: Sequence[LogSightings], noise: Sequence[LogNoise], numbers: Ints, known: KnownLandmarks | None
+) -> Graph:
+    """The graphs of all logs as one, poses in a row, with the known landmarks."""
+    rows = [np.searchsorted(numbers, log.landmark) for log in logs]
+    graphs = [graph_of(log, row, n) for log, row, n in zip(logs, rows, noise, strict=True)]
+    before = np.cumsum([0, *(len(log) for log in logs)])[:-1]
+    none = graphs[0]
+    inverse_root = none.prior_root if known is None else np.linalg.inv(np.linalg.cholesky(known.covariance))
+    return Graph(
+        np.concatenate([g.seen_pose + b for g, b in zip(graphs, before, strict=True)]),
+        np.concatenate([g.seen_landmark for g in graphs]),
+        np.concatenate([g.range_m for g in graphs]),
+        np.concatenate([g.bearing_rad for g in graphs]),
+        np.concatenate([g.seen_root for g in graphs]),
+        np.concatenate([g.motion_pose + b for g, b in zip(graphs, before, strict=True)]),
+        np.concatenate([g.motion for g in graphs]),
+        np.concatenate([g.motion_root for g in graphs]),
+        none.prior_landmark if known is None else np.searchsorted(numbers, known.number),
+        none.prior_xy if known is None else known.xy,
+        inverse_root,
+    )
+
+
+def _vote_again(logs: Sequence[LogSightings], graph: Graph, at: State, robust_dof: float) -> State:
+    """Landmarks where the sightings of all logs together want them: one log alone may have been misled."""
+    before = np.cumsum([0, *(len(log) for log in logs)])[:-1]
+    points = [log.points_xy(at.poses[b : b + len(log)]) for log, b in zip(logs, before, strict=True)]
+    variance = np.concatenate([log.variance() for log in logs])
+    moved = vote(np.concatenate(points), variance, graph.seen_landmark, at.landmarks_xy, robust_dof)
+    return State(at.poses, moved)
+
+
+def _fitting(logs: Sequence[LogSightings], noise: Sequence[LogNoise], solved: Solved) -> Ints:
+    """How many sightings (L,) of each landmark lie where it is, each by its own covariance alone."""
+    graph = solved.graph
+    raw = np.linalg.solve(graph.seen_root, solved.residuals[0][..., None])[..., 0]
+    scaled = raw / np.concatenate(
+        [np.broadcast_to(n.scale, (len(log.pose), 2)) for log, n in zip(logs, noise, strict=True)]
+    )
+    covariance = np.concatenate([log.covariance for log in logs])
+    squared = np.einsum("mi,mi->m", scaled, np.linalg.solve(covariance, scaled[..., None])[..., 0])
+    return np.bincount(graph.seen_landmark[squared <= _INLIER], minlength=len(solved.state.landmarks_xy))
+
+
+def _landmark_covariances(solved: Solved, *, free_frame: bool) -> Array:
+    """Covariances (L, 2, 2) of the landmarks; in a free frame without what moves all of them as one rigid body.
+
+    That part says where the robot stood when it switched on, not how good the map is (inner constraints: Meissl 1969).
+    """
+    xy, width = solved.state.landmarks_xy, len(solved.free)
+    first = width - xy.size
+    blocks = np.empty((len(xy), 2, 2))
+    for start in range(0, xy.size, _COLUMNS_AT_ONCE):
+        columns = np.arange(start, min(start + _COLUMNS_AT_ONCE, xy.size))
+        part = _columns(solved, first + columns)[first:]
+        for axis in (0, 1):
+            own = columns[axis::2]
+            blocks[own // 2, :, axis] = part.reshape(-1, 2, len(columns))[own // 2, :, own - start]
+    if not free_frame:
+        return blocks
+    centred = xy - xy.mean(axis=0)
+    rigid = np.zeros((xy.size, 3))
+    rigid[0::2, 0] = rigid[1::2, 1] = 1
+    rigid[0::2, 2], rigid[1::2, 2] = -centred[:, 1], centred[:, 0]
+    rigid, _ = np.linalg.qr(rigid)
+    right = np.zeros((width, 3))
+    right[first:] = rigid
+    across = solved.factor.solve(right)[first:].reshape(-1, 2, 3)
+    rigid_rows = rigid.reshape(-1, 2, 3)
+    common = rigid.T @ across.reshape(-1, 3)
+    cross = across @ rigid_rows.swapaxes(1, 2)
+    return blocks - cross - cross.swapaxes(1, 2) + rigid_rows @ common @ rigid_rows.swapaxes(1, 2)
+
+
+def _columns(solved: Solved, columns: Ints) -> Array:
+    """Columns (F, C) of the inverse of the normal equations."""
+    unit = np.zeros((len(solved.free), len(columns)))
+    unit[columns, np.arange(len(columns))] = 1
+    return np.asarray(solved.factor.solve(unit))

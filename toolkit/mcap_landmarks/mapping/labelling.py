@@ -1,0 +1,66 @@
+"""Objects of one log to landmarks: the same thing seen again gets the same number, whatever it is called."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, motion_covariance
+from mcap_landmarks.geometry.se2 import Array, between, transform_points
+from mcap_landmarks.mapping.data_association import UNLABELLED, Labels, label_observations
+from mcap_landmarks.mapping.observations import LogObservations
+
+# Odometry this many times better or worse than configured is tried; the observations tell which it is.
+_SCALES = (0.25, 0.5, 1.0, 2.0, 4.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalMap:
+    """What one log saw, in its odometry's frame: landmark (N,) of each of its N observations, `UNLABELLED` if unclear.
+
+    Of L landmarks: kinds (L,) as numbers of classes, positions_xy (L, 2), first guesses. poses (T, 3) of the bundles.
+    """
+
+    landmark: NDArray[np.int64]
+    kinds: NDArray[np.int64]
+    positions_xy: Array
+    poses: Array
+
+
+def motions_of(log: LogObservations) -> Motions:
+    """The log's motions between its bundles."""
+    poses = log.odom_from_base
+    return Motions(between(poses[:-1], poses[1:]), np.diff(log.way_m), np.diff(log.turned_rad))
+
+
+def label_log(log: LogObservations, kinds: NDArray[np.int64], noise: OdometryNoise, slack: float) -> LocalMap:
+    """Label a log's observations, whose classes have the numbers kinds (N,).
+
+    Tried at several scales of the odometry noise; the scale of the highest evidence wins. `slack` widens the
+    observations' sigmas: sensors err more than they say, and a gate that is too tight splits landmarks in two.
+    """
+    motions = motions_of(log)
+    widened = log.covariances * slack**2
+    best: Labels | None = None
+    for scale in _SCALES:
+        scaled = OdometryNoise(
+            noise.position_per_metre_m * scale,
+            noise.heading_per_metre_rad * scale,
+            noise.heading_per_radian_rad * scale,
+        )
+        steps = motion_covariance(motions, scaled)
+        labels = label_observations(log.odom_from_base, steps, log.bundle, kinds, log.points_xy, widened)
+        if best is None or labels.log_evidence > best.log_evidence:
+            best = labels
+    assert best is not None  # noqa: S101 - there is at least one scale
+    return _local_map(log, kinds, best)
+
+
+def _local_map(log: LogObservations, kinds: NDArray[np.int64], labels: Labels) -> LocalMap:
+    seen = np.flatnonzero(labels.landmark != UNLABELLED)
+    numbers, first = np.unique(labels.landmark[seen], return_index=True)
+    landmark = np.full(len(labels.landmark), UNLABELLED, dtype=np.int64)
+    landmark[seen] = np.searchsorted(numbers, labels.landmark[seen])
+    points = transform_points(labels.poses[log.bundle[seen]], log.points_xy[seen])
+    positions = np.array([np.median(points[landmark[seen] == i], axis=0) for i in range(len(numbers))]).reshape(-1, 2)
+    return LocalMap(landmark, kinds[seen[first]], positions, labels.poses)

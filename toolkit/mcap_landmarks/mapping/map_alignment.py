@@ -1,0 +1,102 @@
+"""Where one map of classed landmarks lies in another, without any guess."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from mcap_landmarks.geometry.se2 import Array, transform_points
+
+_NEAR_M, _FAR_M = 0.5, 20.0
+_LIKE_M = 0.5
+_TRIED = 20_000
+_FEWEST = 3
+
+
+def align_maps(
+    kinds: NDArray[np.int64], points_xy: Array, map_kinds: NDArray[np.int64], map_xy: Array, tolerance_m: float
+) -> Array | None:
+    """map_from_local (3,) under which most of the landmarks (N, 2) fall on map landmarks (M, 2) of their class.
+
+    Every pair of landmarks that stand 0.5 to 20 m apart is laid on every pair of the map of the same classes and
+    length; the pose with most landmarks within `tolerance_m` of a partner wins. None if fewer than three (two, where
+    the map's classes are all different) fit, or another pose fits as many.
+    """
+    mine, theirs = _pairs(kinds, points_xy), _pairs(map_kinds, map_xy)
+    poses = _hypotheses(kinds, points_xy, mine, map_kinds, map_xy, theirs)
+    if not len(poses):
+        return None
+    scores = _scores(poses, kinds, points_xy, map_kinds, map_xy, tolerance_m)
+    best = int(np.argmax(scores))
+    distinct = len(np.unique(map_kinds)) == len(map_kinds)
+    if scores[best] < (2 if distinct else _FEWEST):
+        return None
+    apart = np.linalg.norm(poses[:, :2] - poses[best, :2], axis=1) > 4 * tolerance_m
+    apart |= np.cos(poses[:, 2] - poses[best, 2]) < np.cos(0.5)
+    if scores[apart].max(initial=0) >= scores[best]:
+        return None
+    pose: Array = poses[best]
+    return pose
+
+
+def _pairs(kinds: NDArray[np.int64], points_xy: Array) -> NDArray[np.int64]:
+    """Ordered pairs (P, 2) of rows whose distance says something about direction."""
+    near = cKDTree(points_xy).query_pairs(_FAR_M, output_type="ndarray") if len(points_xy) else np.zeros((0, 2), int)
+    pairs = np.concatenate([near, near[:, ::-1]]).astype(np.int64)
+    length = np.linalg.norm(points_xy[pairs[:, 0]] - points_xy[pairs[:, 1]], axis=1)
+    pairs = pairs[(length > _NEAR_M) & (kinds[pairs[:, 0]] <= kinds[pairs[:, 1]])]
+    ordered: NDArray[np.int64] = pairs[np.lexsort(pairs.T)]
+    return ordered
+
+
+def _hypotheses(
+    kinds: NDArray[np.int64],
+    points: Array,
+    mine: NDArray[np.int64],
+    map_kinds: NDArray[np.int64],
+    map_xy: Array,
+    theirs: NDArray[np.int64],
+) -> Array:
+    """Poses (H, 3) that lay one of `mine` on one of `theirs`; evenly thinned where there are too many."""
+    span = 10.0 * max(_FAR_M, 1.0)
+
+    def features(of_kinds: NDArray[np.int64], at: Array, pairs: NDArray[np.int64]) -> Array:
+        length = np.linalg.norm(at[pairs[:, 0]] - at[pairs[:, 1]], axis=1)
+        return np.column_stack([span * of_kinds[pairs], length])
+
+    if not len(mine) or not len(theirs):
+        return np.zeros((0, 3))
+    tree = cKDTree(features(map_kinds, map_xy, theirs))
+    near = tree.query_ball_point(features(kinds, points, mine), _LIKE_M, return_sorted=True)
+    found = [np.asarray(hits, dtype=np.int64) for hits in np.asarray(near, dtype=object)]
+    rows = np.repeat(np.arange(len(mine)), [len(hits) for hits in found])
+    columns = np.concatenate(found)
+    if len(rows) > _TRIED:
+        keep = np.linspace(0, len(rows) - 1, _TRIED).astype(np.int64)
+        rows, columns = rows[keep], columns[keep]
+    a, b = points[mine[rows, 0]], points[mine[rows, 1]]
+    p, q = map_xy[theirs[columns, 0]], map_xy[theirs[columns, 1]]
+    turn = np.arctan2(*(q - p).T[::-1]) - np.arctan2(*(b - a).T[::-1])
+    c, s = np.cos(turn), np.sin(turn)
+    middle, target = (a + b) / 2, (p + q) / 2
+    x = target[:, 0] - c * middle[:, 0] + s * middle[:, 1]
+    y = target[:, 1] - s * middle[:, 0] - c * middle[:, 1]
+    return np.column_stack([x, y, turn])
+
+
+def _scores(
+    poses: Array,
+    kinds: NDArray[np.int64],
+    points: Array,
+    map_kinds: NDArray[np.int64],
+    map_xy: Array,
+    tolerance_m: float,
+) -> NDArray[np.int64]:
+    """How many landmarks (H,) fall near one of their class under each pose."""
+    scores = np.zeros(len(poses), dtype=np.int64)
+    for kind in np.unique(kinds):
+        there = map_xy[map_kinds == kind]
+        if len(there):
+            moved = transform_points(poses[:, None], points[kinds == kind])
+            distance = np.asarray(cKDTree(there).query(moved, distance_upper_bound=tolerance_m)[0])
+            scores += np.isfinite(distance).sum(axis=1)
+    return scores

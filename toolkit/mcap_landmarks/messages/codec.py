@@ -1,0 +1,44 @@
+"""Message dataclasses to CDR bytes and back."""
+
+from struct import error as struct_error
+from typing import Any, ClassVar, Protocol, Self, TypeVar
+
+from rosbags.serde import SerdeError
+
+from mcap_landmarks.errors import MessageError
+from mcap_landmarks.messages.typestore import typestore
+
+
+class Message(Protocol):
+    """What every message dataclass offers; `Any` is a message object of the rosbags typestore."""
+
+    ROS_TYPE: ClassVar[str]
+
+    def to_ros(self) -> Any:
+        """Give the same content as an object of the typestore."""
+
+    @classmethod
+    def from_ros(cls, ros: Any) -> Self:
+        """Take the content of an object of the typestore."""
+
+
+M = TypeVar("M", bound=Message)
+
+
+def encode(message: Message) -> bytes:
+    """CDR bytes (little endian) of a message."""
+    return bytes(typestore().serialize_cdr(message.to_ros(), message.ROS_TYPE))
+
+
+def decode(message_type: type[M], data: bytes | memoryview) -> M:
+    """Message of the given dataclass from CDR bytes.
+
+    Raises:
+        MessageError: the bytes do not fit the type.
+    """
+    try:
+        return message_type.from_ros(typestore().deserialize_cdr(data, message_type.ROS_TYPE))
+    except (SerdeError, struct_error, IndexError, ValueError, UnicodeDecodeError) as error:
+        raise MessageError(
+            f"{len(data)} bytes are not a {message_type.ROS_TYPE}: {error or type(error).__name__}"
+        ) from error

@@ -1,0 +1,127 @@
+"""Image, CompressedImage and CameraInfo."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from mcap_landmarks.messages.parts import Array, header_to_ros, make, stamp_from_ros
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CompressedImage:
+    """An image as the bytes of a file; `format` is ROS's word for its kind, such as `jpeg`."""
+
+    ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/CompressedImage"
+
+    stamp_ns: int
+    frame_id: str
+    format: str
+    data: bytes
+
+    def to_ros(self) -> Any:
+        """See `Message`."""
+        return make(
+            "sensor_msgs/CompressedImage",
+            header=header_to_ros(self.stamp_ns, self.frame_id),
+            format=self.format,
+            data=np.frombuffer(self.data, dtype=np.uint8),
+        )
+
+    @classmethod
+    def from_ros(cls, ros: Any) -> Self:
+        """See `Message`."""
+        return cls(stamp_from_ros(ros.header.stamp), ros.header.frame_id, ros.format, ros.data.tobytes())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Image:
+    """An uncompressed image: `data` are `height_px` rows of `step` bytes in ROS's `encoding`."""
+
+    ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/Image"
+
+    stamp_ns: int
+    frame_id: str
+    height_px: int
+    width_px: int
+    encoding: str
+    is_bigendian: bool
+    step: int
+    data: bytes
+
+    def to_ros(self) -> Any:
+        """See `Message`."""
+        return make(
+            "sensor_msgs/Image",
+            header=header_to_ros(self.stamp_ns, self.frame_id),
+            height=self.height_px,
+            width=self.width_px,
+            encoding=self.encoding,
+            is_bigendian=int(self.is_bigendian),
+            step=self.step,
+            data=np.frombuffer(self.data, dtype=np.uint8),
+        )
+
+    @classmethod
+    def from_ros(cls, ros: Any) -> Self:
+        """See `Message`."""
+        return cls(
+            stamp_from_ros(ros.header.stamp),
+            ros.header.frame_id,
+            ros.height,
+            ros.width,
+            ros.encoding,
+            bool(ros.is_bigendian),
+            ros.step,
+            ros.data.tobytes(),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraInfo:
+    """Intrinsics of a camera: K (3, 3), distortion (n,) of `distortion_model`, R (3, 3), P (3, 4)."""
+
+    ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/CameraInfo"
+
+    stamp_ns: int
+    frame_id: str
+    height_px: int
+    width_px: int
+    distortion_model: str
+    distortion: Array
+    intrinsics: Array
+    rectification: Array
+    projection: Array
+
+    def to_ros(self) -> Any:
+        """See `Message`."""
+        whole = make("sensor_msgs/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
+        return make(
+            "sensor_msgs/CameraInfo",
+            header=header_to_ros(self.stamp_ns, self.frame_id),
+            height=self.height_px,
+            width=self.width_px,
+            distortion_model=self.distortion_model,
+            d=np.ascontiguousarray(self.distortion),
+            k=np.ascontiguousarray(self.intrinsics).ravel(),
+            r=np.ascontiguousarray(self.rectification).ravel(),
+            p=np.ascontiguousarray(self.projection).ravel(),
+            binning_x=0,
+            binning_y=0,
+            roi=whole,
+        )
+
+    @classmethod
+    def from_ros(cls, ros: Any) -> Self:
+        """See `Message`."""
+        return cls(
+            stamp_from_ros(ros.header.stamp),
+            ros.header.frame_id,
+            ros.height,
+            ros.width,
+            ros.distortion_model,
+            np.array(ros.d, dtype=np.float64),
+            np.array(ros.k, dtype=np.float64).reshape(3, 3),
+            np.array(ros.r, dtype=np.float64).reshape(3, 3),
+            np.array(ros.p, dtype=np.float64).reshape(3, 4),
+        )

@@ -1,0 +1,141 @@
+"""How messages lie in CDR, from any schema in ROS 2's language."""
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from struct import error as struct_error
+from typing import Any
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import TypesysError, get_types_from_msg
+
+from mcap_landmarks.errors import MessageError
+from mcap_landmarks.messages.columns import Children, Kind, Moments, Numbers, Rows, Table, Text, Texts
+
+_SCALARS = {
+    "bool": "<u1", "byte": "<u1", "char": "<u1", "octet": "<u1", "int8": "<i1", "uint8": "<u1", "int16": "<i2",
+    "uint16": "<u2", "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8", "float32": "<f4",
+    "float64": "<f8",
+}  # fmt: skip
+_MOMENTS = frozenset({"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"})
+_LITTLE_ENDIAN = b"\x00\x01"
+_Flat = tuple[np.dtype[Any], int, Kind]
+
+
+class Layout:
+    """How messages of one type lie in CDR: `definition` are the fields of all types that it needs, by their names.
+
+    `stamped` says whether each message begins with a time stamp, in its bytes 4 to 12; `has_payload` whether it
+    carries bytes of some other format, as images do.
+
+    Raises:
+        MessageError: the schema cannot be understood.
+    """
+
+    def __init__(self, ros_type: str, schema: str) -> None:
+        self._type = ros_type
+        try:
+            types = get_types_from_msg(schema, ros_type)
+            self.definition: Mapping[str, Any] = {name: fields for name, (_, fields) in types.items()}
+            parts = self._rows().parts
+        except (TypesysError, KeyError, RecursionError) as error:
+            reason = error or type(error).__name__
+            raise MessageError(f"{ros_type}: its schema cannot be understood ({reason})") from error
+        self.stamped = isinstance(next(iter(parts), None), Moments)
+        self.has_payload = any(isinstance(p, Numbers) and p.dtype.itemsize == 1 and p.count is None for p in parts)
+
+    def table(self, messages: Sequence[bytes]) -> Table:
+        """The columns of messages.
+
+        Raises:
+            MessageError: the bytes of one do not fit the schema.
+        """
+        rows = self._rows()
+        try:
+            for data in messages:
+                _read(rows, data)
+        except struct_error as error:
+            raise MessageError("a message is cut") from error
+        return rows.take(len(messages))
+
+    def _rows(self) -> Rows:
+        rows = Rows()
+        for name, node in self.definition[self._type]:
+            _add(rows, self.definition, node, name)
+        return rows
+
+
+@lru_cache(maxsize=256)
+def layout_of(ros_type: str, schema: str) -> Layout:
+    """The layout of a type, made once; raises as `Layout`."""
+    return Layout(ros_type, schema)
+
+
+def _read(rows: Rows, data: bytes) -> None:
+    if data[:2] != _LITTLE_ENDIAN:
+        raise MessageError(f"{len(data)} bytes are not CDR in little endian")
+    left = len(data) - 4 - rows.read(data[4:], 0)
+    if not 0 <= left < 4:
+        raise MessageError(f"{len(data)} bytes do not fit the schema")
+
+
+def _add(rows: Rows, types: Mapping[str, Any], node: Any, path: str) -> None:
+    """Add a field, or all fields of a message type."""
+    sort, detail = node
+    if sort in {Nodetype.ARRAY, Nodetype.SEQUENCE}:
+        element, count = detail
+        _add_many(rows, types, element, path, count if sort == Nodetype.ARRAY else None)
+    elif sort == Nodetype.BASE and detail[0] == "string":
+        rows.append(Text(path))
+    elif sort == Nodetype.NAME and detail in _MOMENTS:
+        rows.append(Moments(path))
+    elif flat := _flat(types, node):
+        _add_numbers(rows, flat, path)
+    else:
+        for name, inner in types[detail]:
+            _add(rows, types, inner, f"{path}.{name}" if path else name)
+
+
+def _add_many(rows: Rows, types: Mapping[str, Any], element: Any, path: str, count: int | None) -> None:
+    flat = _flat(types, element)
+    if flat and count is not None:
+        dtype, width, _ = flat
+        _add_numbers(rows, (dtype, count * width, Kind.NUMBER), path)
+    elif flat:
+        dtype, width, kind = flat
+        rows.append(Numbers(dtype, None, width, [(path, kind, 0, width)]))
+    elif element[0] == Nodetype.BASE:
+        rows.append(Texts(path, count))
+    else:
+        inner = Rows()
+        _add(inner, types, element, "")
+        rows.append(Children(path, count, inner))
+
+
+def _add_numbers(rows: Rows, flat: _Flat, path: str) -> None:
+    """Add numbers to the run of those of the same type that was added last, or begin one."""
+    dtype, width, kind = flat
+    last = rows.parts[-1] if rows.parts else None
+    if not (isinstance(last, Numbers) and last.dtype == dtype and last.count is not None):
+        last = Numbers(dtype, 0)
+        rows.append(last)
+    start = last.count or 0
+    last.count = start + width
+    last.fields.append((path, kind, start, last.count))
+
+
+def _flat(types: Mapping[str, Any], node: Any) -> _Flat | None:
+    """Scalar type, width and kind of a number or of a message of numbers of one type."""
+    sort, detail = node
+    if sort == Nodetype.BASE:
+        scalar = _SCALARS.get(detail[0])
+        if scalar is None and detail[0] != "string":
+            raise KeyError(f"type {detail[0]}")
+        return (np.dtype(scalar), 1, Kind.NUMBER) if scalar else None
+    if sort != Nodetype.NAME or detail in _MOMENTS:
+        return None
+    names = {inner[1][0] if inner[0] == Nodetype.BASE else None for _, inner in types[detail]}
+    if len(names) != 1 or not names <= set(_SCALARS):
+        return None
+    kind = Kind.QUATERNION if detail == "geometry_msgs/msg/Quaternion" else Kind.NUMBER
+    return np.dtype(_SCALARS[names.pop() or ""]), len(types[detail]), kind

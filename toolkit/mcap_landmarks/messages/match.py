@@ -1,0 +1,79 @@
+"""LandmarkMatch: how one bundle was matched to the map, or why not."""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from mcap_landmarks.messages.parts import Array, header_to_ros, make, stamp_from_ros
+
+
+class Status(IntEnum):
+    """What came of localizing one bundle."""
+
+    LOCALIZED = 0
+    AMBIGUOUS = 1
+    TOO_FEW_OBJECTS = 2
+    NO_MATCH = 3
+    INCONSISTENT = 4
+    WEAK_GEOMETRY = 5
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LandmarkMatch:
+    """One bundle's match.
+
+    object_ids, landmark_ids and residual_m (K,) belong together; candidates and their scores are what else was
+    possible; `expected_accidental` is the number of matches this good expected by chance.
+    """
+
+    ROS_TYPE: ClassVar[str] = "mcap_landmarks_msgs/msg/LandmarkMatch"
+
+    stamp_ns: int
+    frame_id: str
+    status: Status
+    object_ids: tuple[str, ...] = ()
+    landmark_ids: tuple[str, ...] = ()
+    residual_m: Array = field(default_factory=lambda: np.zeros(0))
+    candidate_ids: tuple[str, ...] = ()
+    candidate_scores: Array = field(default_factory=lambda: np.zeros(0))
+    expected_accidental: float = 0.0
+    chi2: float = 0.0
+    dof: int = 0
+    bundles_joined: int = 1
+
+    def to_ros(self) -> Any:
+        """See `Message`."""
+        return make(
+            "mcap_landmarks_msgs/LandmarkMatch",
+            header=header_to_ros(self.stamp_ns, self.frame_id),
+            status=int(self.status),
+            object_ids=list(self.object_ids),
+            landmark_ids=list(self.landmark_ids),
+            residual_m=np.ascontiguousarray(self.residual_m, dtype=np.float64),
+            candidate_ids=list(self.candidate_ids),
+            candidate_scores=np.ascontiguousarray(self.candidate_scores, dtype=np.float64),
+            expected_accidental=self.expected_accidental,
+            chi2=self.chi2,
+            dof=self.dof,
+            bundles_joined=self.bundles_joined,
+        )
+
+    @classmethod
+    def from_ros(cls, ros: Any) -> Self:
+        """See `Message`."""
+        return cls(
+            stamp_from_ros(ros.header.stamp),
+            ros.header.frame_id,
+            Status(ros.status),
+            tuple(ros.object_ids),
+            tuple(ros.landmark_ids),
+            np.array(ros.residual_m, dtype=np.float64),
+            tuple(ros.candidate_ids),
+            np.array(ros.candidate_scores, dtype=np.float64),
+            ros.expected_accidental,
+            ros.chi2,
+            ros.dof,
+            ros.bundles_joined,
+        )

@@ -1,0 +1,73 @@
+"""LaserScan."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.messages.parts import header_to_ros, make, stamp_from_ros
+
+LONGEST_S = 2.0
+"""Beams that are said to take longer than this for a turn have times that make no sense."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LaserScan:
+    """One turn of a planar LiDAR: ranges_m (N,), intensities (N,) or (0,), beam i at angle_min + i * increment.
+
+    The stamp is the time of the first beam; beam i is `i * time_increment_s` later.
+    """
+
+    ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/LaserScan"
+
+    stamp_ns: int
+    frame_id: str
+    angle_min_rad: float
+    angle_max_rad: float
+    angle_increment_rad: float
+    time_increment_s: float
+    scan_time_s: float
+    range_min_m: float
+    range_max_m: float
+    ranges_m: NDArray[np.float32]
+    intensities: NDArray[np.float32]
+
+    @property
+    def duration_ns(self) -> int:
+        """How long after the stamp the last beam is; 0 where the scan does not say, or says what cannot be."""
+        turn_s = self.time_increment_s * max(len(self.ranges_m) - 1, 0)
+        return round(turn_s * 1e9) if 0 < turn_s <= LONGEST_S else 0
+
+    def to_ros(self) -> Any:
+        """See `Message`."""
+        return make(
+            "sensor_msgs/LaserScan",
+            header=header_to_ros(self.stamp_ns, self.frame_id),
+            angle_min=self.angle_min_rad,
+            angle_max=self.angle_max_rad,
+            angle_increment=self.angle_increment_rad,
+            time_increment=self.time_increment_s,
+            scan_time=self.scan_time_s,
+            range_min=self.range_min_m,
+            range_max=self.range_max_m,
+            ranges=np.ascontiguousarray(self.ranges_m, dtype=np.float32),
+            intensities=np.ascontiguousarray(self.intensities, dtype=np.float32),
+        )
+
+    @classmethod
+    def from_ros(cls, ros: Any) -> Self:
+        """See `Message`."""
+        return cls(
+            stamp_from_ros(ros.header.stamp),
+            ros.header.frame_id,
+            ros.angle_min,
+            ros.angle_max,
+            ros.angle_increment,
+            ros.time_increment,
+            ros.scan_time,
+            ros.range_min,
+            ros.range_max,
+            np.array(ros.ranges, dtype=np.float32),
+            np.array(ros.intensities, dtype=np.float32),
+        )

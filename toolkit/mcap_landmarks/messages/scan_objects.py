@@ -1,0 +1,75 @@
+"""What a LiDAR scan shows before anyone knows its class, carried as vision_msgs/Detection3DArray."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from mcap_landmarks.messages.hypotheses import (
+    Hypotheses,
+    hypotheses_from_ros,
+    object_to_ros,
+    place_to_ros,
+    results_to_ros,
+)
+from mcap_landmarks.messages.parts import Array, header_to_ros, make, stamp_from_ros
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScanObjects:
+    """N objects in `frame_id`, one message per scan; object i could be any of its K_i hypotheses.
+
+    ids: track ids. hypotheses: per object (class name, probability), which sum to 1: most probable first, a class as
+    often as it has shapes, and at last ("", probability that it is none of them), the bare surface.
+    positions_xy[i] (K_i, 2): the centre of the cross-section in metres under each hypothesis, of the bare surface its
+    middle as the scan sees it; covariances[i] (K_i, 2, 2) in m^2. extents_m (N,): the largest distance of two hits.
+    """
+
+    ROS_TYPE: ClassVar[str] = "vision_msgs/msg/Detection3DArray"
+
+    stamp_ns: int
+    frame_id: str
+    ids: tuple[str, ...]
+    hypotheses: tuple[Hypotheses, ...]
+    positions_xy: tuple[Array, ...]
+    covariances: tuple[Array, ...]
+    extents_m: Array
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def to_ros(self) -> Any:
+        """See `Message`; the box of an object spans its extent about the last hypothesis."""
+        header = header_to_ros(self.stamp_ns, self.frame_id)
+        return make(
+            "vision_msgs/Detection3DArray",
+            header=header,
+            detections=[self._object_to_ros(header, i) for i in range(len(self))],
+        )
+
+    def _object_to_ros(self, header: Any, i: int) -> Any:
+        places = [place_to_ros(*place) for place in zip(self.positions_xy[i], self.covariances[i], strict=True)]
+        results = results_to_ros(self.hypotheses[i], places)
+        middle = self.positions_xy[i][-1].tolist() if results else (0.0, 0.0)
+        return object_to_ros(header, self.ids[i], results, middle, float(self.extents_m[i]))
+
+    @classmethod
+    def from_ros(cls, ros: Any) -> Self:
+        """See `Message`."""
+        hypotheses, positions, covariances = [], [], []
+        for detection in ros.detections:
+            results = detection.results
+            hypotheses.append(hypotheses_from_ros(detection))
+            points = [(one.pose.pose.position.x, one.pose.pose.position.y) for one in results]
+            spreads = [np.asarray(one.pose.covariance, dtype=np.float64).reshape(6, 6)[:2, :2] for one in results]
+            positions.append(np.array(points, dtype=np.float64).reshape(-1, 2))
+            covariances.append(np.array(spreads, dtype=np.float64).reshape(-1, 2, 2))
+        return cls(
+            stamp_from_ros(ros.header.stamp),
+            ros.header.frame_id,
+            tuple(detection.id for detection in ros.detections),
+            tuple(hypotheses),
+            tuple(positions),
+            tuple(covariances),
+            np.array([detection.bbox.size.x for detection in ros.detections], dtype=np.float64),
+        )

@@ -1,0 +1,75 @@
+"""TFMessage: transforms between frames."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+from numpy.typing import ArrayLike
+
+from mcap_landmarks.messages.parts import (
+    Array,
+    header_to_ros,
+    make,
+    planar_parts,
+    point_from_ros,
+    point_to_ros,
+    quaternion_from_ros,
+    quaternion_to_ros,
+    stamp_from_ros,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Transform:
+    """`frame_id` from `child_frame_id` at a time: translation (3,) m, quaternion (4,) x, y, z, w."""
+
+    stamp_ns: int
+    frame_id: str
+    child_frame_id: str
+    translation_m: Array
+    rotation_xyzw: Array
+
+    @classmethod
+    def planar(cls, stamp_ns: int, frames: tuple[str, str], pose: ArrayLike) -> Self:
+        """Transform of the plane x, y, heading; frames are (parent, child)."""
+        return cls(stamp_ns, *frames, *planar_parts(pose))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TFMessage:
+    """Transforms published together."""
+
+    ROS_TYPE: ClassVar[str] = "tf2_msgs/msg/TFMessage"
+
+    transforms: tuple[Transform, ...]
+
+    def to_ros(self) -> Any:
+        """See `Message`."""
+        return make("tf2_msgs/TFMessage", transforms=[_to_ros(transform) for transform in self.transforms])
+
+    @classmethod
+    def from_ros(cls, ros: Any) -> Self:
+        """See `Message`."""
+        return cls(tuple(_from_ros(transform) for transform in ros.transforms))
+
+
+def _to_ros(transform: Transform) -> Any:
+    return make(
+        "geometry_msgs/TransformStamped",
+        header=header_to_ros(transform.stamp_ns, transform.frame_id),
+        child_frame_id=transform.child_frame_id,
+        transform=make(
+            "geometry_msgs/Transform",
+            translation=point_to_ros("geometry_msgs/Vector3", transform.translation_m),
+            rotation=quaternion_to_ros(transform.rotation_xyzw),
+        ),
+    )
+
+
+def _from_ros(ros: Any) -> Transform:
+    return Transform(
+        stamp_from_ros(ros.header.stamp),
+        ros.header.frame_id,
+        ros.child_frame_id,
+        point_from_ros(ros.transform.translation),
+        quaternion_from_ros(ros.transform.rotation),
+    )

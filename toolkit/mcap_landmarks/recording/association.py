@@ -1,0 +1,190 @@
+"""Time association: messages of several channels to bundles, in one pass over a recording and in bounded memory."""
+
+from collections import Counter, deque
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from mcap_landmarks.messages.codec import Message
+from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.recording.odometry_buffer import WIDEST_GAP_NS, Trail
+from mcap_landmarks.stage import Bundle, Channel
+
+WINDOW_NS = WIDEST_GAP_NS
+"""How long a bundle waits for its partners."""
+
+BESIDE_NS = 250_000_000
+"""How far from a bundle's stamp a message may be that belongs beside it."""
+
+
+@dataclass(slots=True)
+class Association:
+    """What became of the messages of one recording.
+
+    `alone` counts bundles without a partner, and `unpaired` messages that are no bundle's partner, by topic.
+    """
+
+    bundles: int = 0
+    without_odometry: int = 0
+    odometry_out_of_order: int = 0
+    odometry_not_finite: int = 0
+    alone: Counter[str] = field(default_factory=Counter)
+    unpaired: Counter[str] = field(default_factory=Counter)
+
+
+def associate(
+    messages: Iterable[tuple[Channel[Any], int, Message]],
+    primary: Channel[Any],
+    counts: Association,
+    *,
+    with_odometry: bool = True,
+    held: Collection[Channel[Any]] = (),
+    beside: Collection[Channel[Any]] = (),
+) -> Iterator[Bundle]:
+    """One bundle per message of the channel `primary`, with odometry interpolated at its stamp if that is wanted.
+
+    `messages` are (channel, log time, message) by log time; every `Odometry` among them is taken as the robot's.
+    Stamps are the headers', log time where those are zero. Of a `held` channel a bundle gets the latest message so far,
+    of transforms the latest of every frame. Of a channel `beside` it gets the message nearest to its stamp, within
+    `BESIDE_NS`, among those that are nearer to no other bundle. A bundle waits for what is still to come, at most
+    `WINDOW_NS` of log time; then it goes without. `counts` is kept up to date.
+    """
+    table = _Table(primary, counts, with_odometry, held, beside)
+    for channel, log_time_ns, message in messages:
+        table.take(channel, log_time_ns, message)
+        yield from table.ready(log_time_ns)
+    yield from table.ready(None)
+
+
+class _Table:
+    """Where messages wait for each other."""
+
+    def __init__(
+        self,
+        primary: Channel[Any],
+        counts: Association,
+        with_odometry: bool,
+        held: Collection[Channel[Any]],
+        beside: Collection[Channel[Any]],
+    ) -> None:
+        self._primary, self._counts = primary, counts
+        self._trail = Trail() if with_odometry else None
+        self._held = {channel: _Held() for channel in held}
+        self._beside = {channel: _Beside() for channel in beside}
+        self._waiting: deque[Bundle] = deque()
+        self._stamps: deque[int] = deque()  # of the bundles of the last moments, those that went included
+
+    def take(self, channel: Channel[Any], log_time_ns: int, message: Message) -> None:
+        stamp_ns = getattr(message, "stamp_ns", 0) or log_time_ns
+        if channel == self._primary:
+            self._waiting.append(Bundle(stamp_ns, log_time_ns, {channel: message}))
+            self._stamps.append(stamp_ns)
+        elif channel in self._held:
+            self._held[channel].take(message)
+        elif channel in self._beside:
+            self._beside[channel].messages.append((stamp_ns, message))
+        elif self._trail is not None and isinstance(message, Odometry):
+            self._trail.add(stamp_ns, message)
+            self._counts.odometry_out_of_order = self._trail.out_of_order
+            self._counts.odometry_not_finite = self._trail.not_finite
+
+    def ready(self, log_time_ns: int | None) -> Iterator[Bundle]:
+        """The bundles that have nothing more to wait for at a log time; at the end, None, that is all."""
+        while self._waiting:
+            first = self._waiting[0]
+            out_of_time = log_time_ns is None or log_time_ns - first.log_time_ns > WINDOW_NS
+            if not (out_of_time or self._is_complete(first)):
+                return
+            yield self._finish(self._waiting.popleft())
+        if log_time_ns is None:
+            for channel, partners in self._beside.items():
+                self._counts.unpaired[channel.topic] += len(partners.messages)
+
+    def _is_complete(self, bundle: Bundle) -> bool:
+        stamp_ns = bundle.stamp_ns
+        if self._trail is not None and self._trail.latest_ns < stamp_ns + self._duration_ns(bundle):
+            return False
+        if any(held.latest is None for held in self._held.values()):
+            return False
+        # A later bundle may be nearer to a message that is near to this one.
+        rivals_known = not self._beside or self._stamps[-1] > stamp_ns + 2 * BESIDE_NS
+        return rivals_known and all(partners.passed(stamp_ns) for partners in self._beside.values())
+
+    def _duration_ns(self, bundle: Bundle) -> int:
+        return getattr(bundle.messages[self._primary], "duration_ns", 0)
+
+    def _finish(self, bundle: Bundle) -> Bundle:
+        counts, found = self._counts, dict(bundle.messages)
+        counts.bundles += 1
+        odometry = None
+        if self._trail is not None:
+            odometry = self._trail.at(bundle.stamp_ns)
+            counts.without_odometry += odometry is None
+            duration_ns = self._duration_ns(bundle)
+            if odometry is not None and duration_ns:
+                odometry = replace(odometry, steps=self._trail.around(bundle.stamp_ns, duration_ns))
+        found.update({channel: held.latest for channel, held in self._held.items() if held.latest is not None})
+        for channel, partners in self._beside.items():
+            partner = partners.pick(bundle.stamp_ns, self._stamps)
+            counts.unpaired[channel.topic] += partners.forget(bundle.stamp_ns - BESIDE_NS)
+            if partner is None:
+                counts.alone[channel.topic] += 1
+            else:
+                found[channel] = partner
+        while self._stamps[0] < bundle.stamp_ns - 2 * BESIDE_NS:
+            self._stamps.popleft()
+        return Bundle(bundle.stamp_ns, bundle.log_time_ns, found, odometry)
+
+
+class _Held:
+    """The latest message of a channel; of transforms, one message with the latest of every frame."""
+
+    def __init__(self) -> None:
+        self._message: Message | None = None
+        self._transforms: dict[str, Transform] = {}
+
+    def take(self, message: Message) -> None:
+        if isinstance(message, TFMessage):
+            self._transforms.update({step.child_frame_id: step for step in message.transforms})
+            self._message = None
+        else:
+            self._message = message
+
+    @property
+    def latest(self) -> Message | None:
+        if self._message is None and self._transforms:
+            self._message = TFMessage(tuple(self._transforms.values()))
+        return self._message
+
+
+class _Beside:
+    """Messages of a channel that may still belong beside a bundle, with their stamps."""
+
+    def __init__(self) -> None:
+        self.messages: deque[tuple[int, Message]] = deque()
+
+    def passed(self, stamp_ns: int) -> bool:
+        """Whether messages have come that are too late for a bundle's stamp."""
+        return bool(self.messages) and self.messages[-1][0] > stamp_ns + BESIDE_NS
+
+    def pick(self, stamp_ns: int, rivals_ns: Iterable[int]) -> Message | None:
+        """Take out the message nearest to a stamp, of those that no rival is nearer to."""
+        mine = [
+            (abs(at_ns - stamp_ns), i)
+            for i, (at_ns, _) in enumerate(self.messages)
+            if abs(at_ns - stamp_ns) <= min(BESIDE_NS, *(abs(at_ns - rival) for rival in rivals_ns))
+        ]
+        if not mine:
+            return None
+        _, nearest = min(mine)
+        message = self.messages[nearest][1]
+        del self.messages[nearest]
+        return message
+
+    def forget(self, before_ns: int) -> int:
+        """Drop the messages before a time; return their number."""
+        kept = [entry for entry in self.messages if entry[0] >= before_ns]
+        dropped = len(self.messages) - len(kept)
+        self.messages = deque(kept)
+        return dropped

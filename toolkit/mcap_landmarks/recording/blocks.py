@@ -1,0 +1,149 @@
+"""Blocks of a recording to messages: decompress, check, parse."""
+
+import zlib
+from collections.abc import Iterator, Mapping
+from struct import error as struct_error
+from typing import BinaryIO
+
+import lz4.frame
+import zstandard
+
+from mcap_landmarks.recording.container import CHUNK, LARGEST_CHUNK, MESSAGE, MESSAGE_FIXED, RECORD, Opcode
+from mcap_landmarks.recording.index import Block
+from mcap_landmarks.stage import Connection, RawMessage
+
+
+class DamagedBlockError(ValueError):
+    """A chunk that cannot be trusted; the message says why."""
+
+
+def chunk_content(record: bytes, *, verify: bool) -> memoryview:
+    """The uncompressed records of a chunk, from the content of its record.
+
+    Raises:
+        DamagedBlockError: it cannot be decompressed, has another size than declared, or a wrong CRC.
+    """
+    size, crc, compression, data, length = _header(record)
+    if len(data) != length:
+        raise DamagedBlockError(f"it claims {size} bytes from {length}")
+    content = _decompress(compression, data, size)
+    if len(content) != size:
+        raise DamagedBlockError(f"it holds {len(content)} bytes instead of {size}")
+    if verify and crc and zlib.crc32(content) != crc:
+        raise DamagedBlockError("its CRC does not match")
+    return content
+
+
+def cut_chunk_content(record: bytes) -> memoryview:
+    """What can be had of a chunk that the end of the file cuts: its first whole records. Their CRC is unknown.
+
+    Raises:
+        DamagedBlockError: not even its header is there, or the bytes are not what it says.
+    """
+    _, _, compression, data, _ = _header(record)
+    content = data
+    try:
+        if compression == "zstd":
+            content = memoryview(zstandard.ZstdDecompressor().decompressobj().decompress(data))
+        elif compression == "lz4":
+            content = memoryview(lz4.frame.LZ4FrameDecompressor().decompress(data))
+    except (zstandard.ZstdError, RuntimeError, EOFError) as error:
+        raise DamagedBlockError(f"{compression} cannot decompress it") from error
+    position = 0
+    while position + RECORD.size <= len(content):
+        end = position + RECORD.size + RECORD.unpack_from(content, position)[1]
+        if end > len(content):
+            break
+        position = end
+    return content[:position]
+
+
+def _header(record: bytes) -> tuple[int, int, str, memoryview, int]:
+    """Uncompressed size, CRC, compression, the data that is there, and how long it should be."""
+    try:
+        _, _, size, crc = CHUNK.unpack_from(record)
+        name_length = int.from_bytes(record[28:32], "little")
+        compression = bytes(record[32 : 32 + name_length]).decode()
+    except (struct_error, ValueError) as error:
+        raise DamagedBlockError("its header is damaged") from error
+    if size > LARGEST_CHUNK:
+        raise DamagedBlockError(f"it claims {size} bytes")
+    start = 32 + name_length + 8
+    length = int.from_bytes(record[start - 8 : start], "little")
+    return size, crc, compression, memoryview(record)[start : start + length], length
+
+
+def _decompress(compression: str, data: memoryview, size: int) -> memoryview:
+    if compression == "":
+        return data
+    try:
+        if compression == "zstd":
+            if zstandard.frame_content_size(data) not in {-1, size}:
+                raise DamagedBlockError("its sizes contradict each other")
+            return memoryview(zstandard.ZstdDecompressor().decompress(data, max_output_size=size))
+        if compression == "lz4":
+            return memoryview(lz4.frame.decompress(data))
+    except (zstandard.ZstdError, RuntimeError, MemoryError) as error:
+        raise DamagedBlockError(f"{compression} cannot decompress it") from error
+    raise DamagedBlockError(f"its compression {compression!r} is unknown")
+
+
+def records_in(content: memoryview) -> Iterator[tuple[int, int, int]]:
+    """Opcode, start and end of the content of each record.
+
+    Raises:
+        DamagedBlockError: the last one runs over the end.
+    """
+    position, end = 0, len(content)
+    unpack = RECORD.unpack_from
+    while position < end:
+        if position + RECORD.size > end:
+            raise DamagedBlockError("a record in it is cut")
+        opcode, length = unpack(content, position)
+        start = position + RECORD.size
+        position = start + length
+        if position > end:
+            raise DamagedBlockError("a record in it is longer than the chunk")
+        yield opcode, start, position
+
+
+def block_messages(
+    stream: BinaryIO, block: Block, wanted: Mapping[int, Connection], *, verify: bool
+) -> list[RawMessage]:
+    """The wanted channels' messages of a block, by log time; messages of equal time keep their order.
+
+    Raises:
+        DamagedBlockError: the block cannot be trusted; none of its messages is.
+    """
+    stream.seek(block.offset)
+    raw = stream.read(block.length)
+    if len(raw) < block.length:
+        raise DamagedBlockError("the file ends within it")
+    if block.is_chunk:
+        if raw[0] != Opcode.CHUNK:
+            raise DamagedBlockError("there is no chunk where the summary says")
+        record = raw[RECORD.size :]
+        content = cut_chunk_content(record) if block.is_cut else chunk_content(record, verify=verify)
+    else:
+        content = memoryview(raw)
+    found: list[RawMessage] = []
+    append, unpack, get = found.append, MESSAGE.unpack_from, wanted.get
+    ordered, last = True, 0
+    for opcode, start, end in records_in(content):
+        if opcode != Opcode.MESSAGE:
+            continue
+        if end - start < MESSAGE_FIXED:
+            raise DamagedBlockError("a message in it is cut")
+        _, _, channel_id, sequence, log_time, publish_time = unpack(content, start - RECORD.size)
+        connection = get(channel_id)
+        if connection is not None:
+            append(RawMessage(connection, log_time, publish_time, sequence, content[start + MESSAGE_FIXED : end]))
+            ordered = ordered and log_time >= last
+            last = log_time
+    if not ordered:
+        found.sort(key=_log_time)
+    return found
+
+
+def _log_time(message: RawMessage) -> int:
+    return message.log_time_ns

@@ -1,0 +1,209 @@
+"""Read recordings: by index where there is one, by scanning where there is none, in the order of log time."""
+
+import contextlib
+import hashlib
+import heapq
+from collections.abc import Collection, Iterator
+from functools import cached_property
+from pathlib import Path
+from struct import error as struct_error
+from typing import BinaryIO
+
+from mcap import records
+from mcap.exceptions import McapError
+
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.manifest import RUN, carried_fingerprint
+from mcap_landmarks.recording.blocks import DamagedBlockError, block_messages
+from mcap_landmarks.recording.container import CHUNK, MAGIC, RECORD, Opcode, parse
+from mcap_landmarks.recording.index import Block, Index, index_from_summary, read_record
+from mcap_landmarks.recording.rebuild_index import index_by_scanning
+from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
+
+
+@contextlib.contextmanager
+def open_recording(path: Path, *, verify: bool = True) -> Iterator["Recording"]:
+    """An open recording; `verify` checks the CRC of every chunk that is read.
+
+    Raises:
+        RecordingError: there is no such file, or it is not an MCAP file.
+    """
+    with _open(path) as stream:
+        yield Recording(path, stream, _index(path, stream), verify=verify)
+
+
+def _open(path: Path) -> BinaryIO:
+    try:
+        return path.open("rb")
+    except FileNotFoundError as error:
+        raise RecordingError(f"{path}: there is no such file; check the path") from error
+    except IsADirectoryError as error:
+        raise RecordingError(
+            f"{path} is a folder; convert it first: mcap-landmarks convert {path} -o LOG.mcap"
+        ) from error
+    except PermissionError as error:
+        raise RecordingError(f"{path} may not be read; change its permissions") from error
+
+
+def _index(path: Path, stream: BinaryIO) -> Index:
+    size = stream.seek(0, 2)
+    stream.seek(0)
+    if size == 0:
+        raise RecordingError(f"{path} is empty (0 bytes); record or copy it again")
+    if stream.read(len(MAGIC)) != MAGIC:
+        raise RecordingError(f"{path} is not an MCAP file; mcap-landmarks convert reads bags and data sets")
+    try:
+        opcode, content = read_record(stream, len(MAGIC))
+        if opcode != Opcode.HEADER:
+            raise RecordingError(f"{path} does not begin with an MCAP header; copy it again")
+        header = parse(records.Header, content)
+    except (EOFError, McapError, struct_error, ValueError, MemoryError, OverflowError) as error:
+        raise RecordingError(f"{path} ends within its MCAP header; copy it again") from error
+    return index_from_summary(stream, size, header) or index_by_scanning(stream, size, header)
+
+
+class Recording:
+    """An open recording; made by `open_recording`.
+
+    `channels` lists every channel with its count, `start_ns` and `end_ns` are the first and last log time, `metadata`
+    holds the entries of every metadata record by name. `losses` says in words what could not be read, so far.
+    """
+
+    def __init__(self, path: Path, stream: BinaryIO, index: Index, *, verify: bool) -> None:
+        self.path = path
+        self.profile, self.library = index.header.profile, index.header.library
+        self.start_ns, self.end_ns = index.start_ns, index.end_ns
+        self.metadata = index.metadata
+        self.losses = list(index.losses)
+        self._stream, self._index, self._verify = stream, index, verify
+        self._connections = {key: _connection(index, channel) for key, channel in sorted(index.channels.items())}
+        self.channels = tuple(
+            ChannelSummary(connection, index.counts.get(key, 0)) for key, connection in self._connections.items()
+        )
+        orphans = sum(count for key, count in index.counts.items() if key not in self._connections)
+        if orphans:
+            self.losses.append(f"{orphans} messages belong to channels that are nowhere described; they are left out")
+
+    def connections(self, topic: str) -> tuple[Connection, ...]:
+        """The connections of a topic, most often one."""
+        return tuple(entry.connection for entry in self.channels if entry.connection.topic == topic)
+
+    def fingerprint(self) -> str:
+        """Identity by content: that of the recording whose results this one carries, else a hash over its blocks."""
+        return self._carried or self._content
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether the manifest belongs to the content: an output of ours that nobody edited."""
+        return self._carried is not None
+
+    @cached_property
+    def _carried(self) -> str | None:
+        return carried_fingerprint(self.metadata, self._content) if RUN in self.metadata else None
+
+    @cached_property
+    def _content(self) -> str:
+        digest = hashlib.sha256()
+        for block in self._index.blocks:
+            self._stream.seek(block.offset)
+            if block.is_chunk:  # times, size and CRC stand for the content, which need not be read
+                digest.update(self._stream.read(RECORD.size + CHUNK.size)[RECORD.size :])
+            else:
+                digest.update(self._stream.read(block.length))
+        return digest.hexdigest()
+
+    def attachments(self) -> Iterator[records.Attachment]:
+        """The attachments, whole, in the order of the file."""
+        for offset in self._index.attachments:
+            yield parse(records.Attachment, read_record(self._stream, offset)[1])
+
+    def messages(
+        self,
+        connections: Collection[Connection] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+        progress: Progress | None = None,
+    ) -> Iterator[RawMessage]:
+        """Messages by log time, all or those of some connections, from `start_ns` on and before `end_ns`.
+
+        Holds only the chunks in memory that overlap in time. `progress` is told the bytes of each chunk that was read.
+        """
+        wanted, first, last = self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns
+        for message in self._merge(self._blocks(wanted, first, last), wanted, progress):
+            if first <= message.log_time_ns < last:
+                yield message
+
+    def size_bytes(
+        self,
+        connections: Collection[Connection] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+    ) -> int:
+        """The bytes that `messages` reads for the same arguments: chunks without a wanted channel are passed over."""
+        blocks = self._blocks(self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns)
+        return sum(block.length for block in blocks)
+
+    def _wanted(self, connections: Collection[Connection] | None) -> dict[int, Connection]:
+        return {key: c for key, c in self._connections.items() if connections is None or c in connections}
+
+    def _blocks(self, wanted: dict[int, Connection], first_ns: int, last_ns: int) -> list[Block]:
+        """The blocks that may hold wanted messages of those times, by their start."""
+        blocks = [
+            block
+            for block in self._index.blocks
+            if block.end_ns >= first_ns
+            and block.start_ns < last_ns
+            and (block.channel_ids is None or not block.channel_ids.isdisjoint(wanted))
+        ]
+        return sorted(blocks, key=lambda block: (block.start_ns, block.offset))
+
+    def _load(self, block: Block, wanted: dict[int, Connection], progress: Progress | None) -> list[RawMessage]:
+        try:
+            found = block_messages(self._stream, block, wanted, verify=self._verify)
+        except DamagedBlockError as error:
+            loss = f"the chunk at byte {block.offset} is damaged ({error}); its messages are left out"
+            if loss not in self.losses:
+                self.losses.append(loss)
+            found = []
+        if progress:
+            progress(block.length)
+        return found
+
+    def _merge(
+        self, blocks: list[Block], wanted: dict[int, Connection], progress: Progress | None
+    ) -> Iterator[RawMessage]:
+        """Messages of blocks that are sorted by their start, which may overlap."""
+        active: list[tuple[int, int, int, list[RawMessage]]] = []  # time of the next message, block, position, messages
+        for number, block in enumerate(blocks):
+            yield from _drain(active, block.start_ns)
+            messages = self._load(block, wanted, progress)
+            if messages:
+                heapq.heappush(active, (messages[0].log_time_ns, number, 0, messages))
+        yield from _drain(active, 2**64)
+
+
+def _drain(active: list[tuple[int, int, int, list[RawMessage]]], until_ns: int) -> Iterator[RawMessage]:
+    """Messages before `until_ns`, in order, from the heap of open blocks; of equal times the earlier block's first."""
+    while active and active[0][0] < until_ns:
+        _, number, position, messages = heapq.heappop(active)
+        rival_ns, rival = (active[0][0], active[0][1]) if active else (until_ns, -1)
+        end = len(messages)
+        while position < end:
+            time_ns = messages[position].log_time_ns
+            if time_ns >= until_ns or time_ns > rival_ns or (time_ns == rival_ns and number > rival):
+                heapq.heappush(active, (time_ns, number, position, messages))
+                break
+            yield messages[position]
+            position += 1
+
+
+def _connection(index: Index, channel: records.Channel) -> Connection:
+    schema = index.schemas.get(channel.schema_id)
+    return Connection(
+        channel.topic,
+        schema.name if schema else "",
+        schema.data if schema else b"",
+        schema.encoding if schema else "",
+        channel.message_encoding,
+        channel.metadata,
+    )

@@ -1,0 +1,247 @@
+"""Write recordings: chunked, indexed, checksummed, and whole or not at all."""
+
+import contextlib
+import hashlib
+import zlib
+from array import array
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from mcap import records
+from zstandard import ZstdCompressor
+
+from mcap_landmarks.atomic import atomic_file
+from mcap_landmarks.channels import MAP, MAP_MARKERS, MAP_PATH, TF_STATIC, TRUTH_OBJECTS
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.manifest import CONTENT, RUN, STAGE, entry_text
+from mcap_landmarks.messages.codec import encode
+from mcap_landmarks.messages.qos import KEY, qos_profile
+from mcap_landmarks.messages.typestore import definition
+from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, Opcode, serialize
+from mcap_landmarks.recording.summary import summary_section
+from mcap_landmarks.stage import Channel, Connection, RawMessage, Stamped
+
+CHUNK_BYTES = 1 << 20
+CHUNK_NS = 5 * 10**9
+"""Where a chunk ends: chunks that overlap in time over longer cost readers memory."""
+_IMAGE_TYPES = frozenset({"sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"})
+_LATCHED = frozenset(channel.topic for channel in (TF_STATIC, MAP, MAP_MARKERS, MAP_PATH, TRUTH_OBJECTS))
+
+
+@contextlib.contextmanager
+def create_recording(
+    path: Path, metadata: Mapping[str, Mapping[str, str]] | None = None
+) -> Iterator["RecordingWriter"]:
+    """A writer whose file takes the name `path` when the block ends well and vanishes when it does not.
+
+    Raises:
+        UsageError, RecordingError: the file cannot be written; nothing is left behind.
+    """
+    with atomic_file(path) as stream:
+        writer = RecordingWriter(stream)
+        for name, entries in (metadata or {}).items():
+            writer.metadata[name] = dict(entries)
+        yield writer
+        writer.finish()
+
+
+@dataclass(slots=True)
+class _Chunk:
+    """Messages on their way into one chunk of the file."""
+
+    compressed: bool
+    data: bytearray = field(default_factory=bytearray)
+    start_ns: int = 2**64 - 1
+    end_ns: int = 0
+    index: "dict[int, array[int]]" = field(default_factory=dict)
+
+
+class RecordingWriter:
+    """Writes one recording to a stream; made by `create_recording`.
+
+    Every image channel gets uncompressed chunks of its own; the others share zstd chunks, results with those of their
+    stage. A chunk ends after 1 MiB or 5 s. What `metadata` holds when the file is finished goes into it, one record per
+    name; a manifest with a fingerprint is bound to the content.
+    """
+
+    def __init__(self, stream: BinaryIO) -> None:
+        self.metadata: dict[str, dict[str, str]] = {}
+        self.counts: dict[str, int] = {}
+        self._stream = stream
+        self._offset = self._crc = 0
+        self._connections: dict[Connection, tuple[int, str]] = {}
+        self._own: dict[tuple[str, str], Connection] = {}
+        self._schemas: dict[tuple[str, str, bytes], records.Schema] = {}
+        self._channels: list[records.Channel] = []
+        self._message_counts: dict[int, int] = {}
+        self._chunks: dict[str, _Chunk] = {}
+        self._chunk_indexes: list[records.ChunkIndex] = []
+        self._attachments: list[records.AttachmentIndex] = []
+        self._content = hashlib.sha256()
+        self._compressor = ZstdCompressor(level=3)
+        self._put(MAGIC + serialize(records.Header(profile="ros2", library="mcap-landmarks")))
+
+    def declare(self, connection: Connection) -> None:
+        """Give a connection its channel, also if no message of it comes."""
+        if connection in self._connections:
+            return
+        schema_id = 0
+        if connection.message_type:
+            key = (connection.message_type, connection.schema_encoding, connection.schema)
+            if key not in self._schemas:
+                schema = records.Schema(len(self._schemas) + 1, key[2], key[1], key[0])
+                self._schemas[key] = schema
+                self._put(serialize(schema))
+            schema_id = self._schemas[key].id
+        channel = records.Channel(
+            id=len(self._channels) + 1,
+            topic=connection.topic,
+            message_encoding=connection.message_encoding,
+            metadata=dict(connection.metadata),
+            schema_id=schema_id,
+        )
+        if channel.id > 0xFFFF:
+            raise RecordingError(f"{connection.topic} is channel {channel.id}; MCAP holds 65535: choose topics")
+        self._put(serialize(channel))
+        self._channels.append(channel)
+        self._message_counts[channel.id] = 0
+        self.counts.setdefault(connection.topic, 0)
+        own = connection.metadata.get(STAGE, "")
+        group = f"image {channel.id}" if connection.message_type in _IMAGE_TYPES else own
+        self._connections[connection] = (channel.id, group)
+
+    def write(self, raw: RawMessage) -> None:
+        """Write a message as it is, on the channel of its connection."""
+        if raw.connection not in self._connections:
+            self.declare(raw.connection)
+        channel_id, group = self._connections[raw.connection]
+        chunk = self._chunks.get(group)
+        if chunk is None:
+            chunk = self._chunks[group] = _Chunk(compressed=not group.startswith("image "))
+        time_ns, size = raw.log_time_ns, len(raw.data)
+        entries = chunk.index.get(channel_id)
+        if entries is None:
+            entries = chunk.index[channel_id] = array("Q")
+        entries.extend((time_ns, len(chunk.data)))
+        chunk.data += MESSAGE.pack(
+            Opcode.MESSAGE, MESSAGE_FIXED + size, channel_id, raw.sequence, time_ns, raw.publish_time_ns
+        )
+        chunk.data += raw.data
+        chunk.start_ns = min(chunk.start_ns, time_ns)
+        chunk.end_ns = max(chunk.end_ns, time_ns)
+        self._message_counts[channel_id] += 1
+        self.counts[raw.connection.topic] += 1
+        if len(chunk.data) >= CHUNK_BYTES or chunk.end_ns - chunk.start_ns >= CHUNK_NS:
+            for name in [key for key, other in self._chunks.items() if time_ns - other.start_ns >= CHUNK_NS]:
+                self._flush(self._chunks.pop(name))
+            if group in self._chunks:
+                self._flush(self._chunks.pop(group))
+
+    def add(self, stamped: Stamped, stage: str = "") -> None:
+        """Encode a message of ours, a result of `stage` if it is one, and write it; it is published when logged."""
+        connection = self.connection(stamped.channel, stage)
+        sequence = self.counts.get(connection.topic, 0)
+        time_ns = stamped.log_time_ns
+        self.write(RawMessage(connection, time_ns, time_ns, sequence, encode(stamped.message)))
+
+    def connection(self, channel: Channel[Any], stage: str = "") -> Connection:
+        """The connection that messages of a channel of ours go to; that of results names their stage."""
+        if (channel.topic, stage) not in self._own:
+            ros_type = channel.message.ROS_TYPE
+            metadata = {KEY: qos_profile(latched=channel.topic in _LATCHED)} | ({STAGE: stage} if stage else {})
+            self._own[channel.topic, stage] = Connection(
+                channel.topic, ros_type, definition(ros_type).encode(), metadata=metadata
+            )
+        return self._own[channel.topic, stage]
+
+    def attach(self, attachment: records.Attachment) -> None:
+        """Carry an attachment over from another recording."""
+        data = serialize(attachment)
+        self._attachments.append(
+            records.AttachmentIndex(
+                offset=self._offset,
+                length=len(data),
+                log_time=attachment.log_time,
+                create_time=attachment.create_time,
+                data_size=len(attachment.data),
+                name=attachment.name,
+                media_type=attachment.media_type,
+            )
+        )
+        self._put(data)
+
+    def finish(self) -> None:
+        """Write what is left, the metadata and the summary; afterwards the file is complete."""
+        for group in sorted(self._chunks, key=lambda name: self._chunks[name].start_ns):
+            self._flush(self._chunks[group])
+        if "fingerprint" in self.metadata.get(RUN, {}):
+            self.metadata[RUN][CONTENT] = entry_text(self._content.hexdigest())
+        metadata_indexes = []
+        for name, entries in sorted(self.metadata.items()):
+            data = serialize(records.Metadata(name=name, metadata=dict(sorted(entries.items()))))
+            metadata_indexes.append(records.MetadataIndex(length=len(data), name=name, offset=self._offset))
+            self._put(data)
+        self._put(serialize(records.DataEnd(data_section_crc=self._crc)))
+        starts = [index.message_start_time for index in self._chunk_indexes]
+        ends = [index.message_end_time for index in self._chunk_indexes]
+        statistics = records.Statistics(
+            message_count=sum(self._message_counts.values()),
+            schema_count=len(self._schemas),
+            channel_count=len(self._channels),
+            attachment_count=len(self._attachments),
+            metadata_count=len(metadata_indexes),
+            chunk_count=len(self._chunk_indexes),
+            message_start_time=min(starts, default=0),
+            message_end_time=max(ends, default=0),
+            channel_message_counts={key: count for key, count in self._message_counts.items() if count},
+        )
+        groups: list[list[records.McapRecord]] = [
+            list(self._schemas.values()),
+            list(self._channels),
+            [statistics],
+            list(self._chunk_indexes),
+            list(self._attachments),
+            list(metadata_indexes),
+        ]
+        self._stream.write(summary_section(groups, self._offset))
+
+    def _flush(self, chunk: _Chunk) -> None:
+        content = self._compressor.compress(bytes(chunk.data)) if chunk.compressed else bytes(chunk.data)
+        record = records.Chunk(
+            compression="zstd" if chunk.compressed else "",
+            data=content,
+            message_start_time=chunk.start_ns,
+            message_end_time=chunk.end_ns,
+            uncompressed_crc=zlib.crc32(chunk.data),
+            uncompressed_size=len(chunk.data),
+        )
+        start = self._offset
+        self._content.update(
+            CHUNK.pack(chunk.start_ns, chunk.end_ns, record.uncompressed_size, record.uncompressed_crc)
+        )
+        self._put(serialize(record))
+        length, offsets = self._offset - start, {}
+        for channel_id, entries in sorted(chunk.index.items()):
+            offsets[channel_id] = self._offset
+            pairs = list(zip(entries[::2], entries[1::2], strict=True))
+            self._put(serialize(records.MessageIndex(channel_id=channel_id, records=pairs)))
+        self._chunk_indexes.append(
+            records.ChunkIndex(
+                chunk_length=length,
+                chunk_start_offset=start,
+                compression=record.compression,
+                compressed_size=len(content),
+                message_end_time=chunk.end_ns,
+                message_index_length=self._offset - start - length,
+                message_index_offsets=offsets,
+                message_start_time=chunk.start_ns,
+                uncompressed_size=len(chunk.data),
+            )
+        )
+
+    def _put(self, data: bytes) -> None:
+        self._stream.write(data)
+        self._offset += len(data)
+        self._crc = zlib.crc32(data, self._crc)

@@ -1,0 +1,119 @@
+"""What a plot shows, gathered from files: one map, and any number of runs in it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.evaluation.alignment import fit
+from mcap_landmarks.evaluation.landmark_metrics import associate
+from mcap_landmarks.evaluation.metrics import Outcome, Reference, ScoredPoses, score
+from mcap_landmarks.evaluation.pose_metrics import align
+from mcap_landmarks.evaluation.read import read_run
+from mcap_landmarks.evaluation.trajectory import Trajectory, interpolated
+from mcap_landmarks.geometry.se2 import Array, compose, rotation, transform_points
+from mcap_landmarks.maps.database import read_map
+from mcap_landmarks.maps.model import Group
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.stage import Progress
+
+_MAX_GAP_NS = 5 * 10**8
+"""The truth is interpolated over gaps up to this, as `evaluate` does by default."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """One run: its poses, a path (`continuous`) or each of its own, the truth, and the poses that have a truth."""
+
+    name: str
+    estimate: Trajectory
+    continuous: bool
+    truth: Trajectory | None
+    scored: ScoredPoses
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawing:
+    """Everything that a plot shows, in one frame: landmarks, their groups, the objects of the truth, runs."""
+
+    landmarks: SceneObjects | None = None
+    groups: tuple[Group, ...] = ()
+    objects: SceneObjects | None = None
+    runs: tuple[Run, ...] = ()
+
+
+def gather(paths: Sequence[Path], *, aligned: bool, progress: Progress | None = None) -> tuple[Drawing, list[str]]:
+    """The drawing of maps, logs with results, or results as in Appendix D, and what of them could not be read.
+
+    The first input that has a map gives the landmarks. `aligned` moves each run by the SE(2) that fits its poses best
+    to its truth, and the landmarks with the first run, or by their own fit if no run has poses with a truth.
+
+    Raises:
+        ToolkitError: an input cannot be read, or none has anything to draw.
+    """
+    drawing = Drawing()
+    losses: list[str] = []
+    for path in paths:
+        outcome, reference, problems = read_run(path, progress)
+        losses.extend(f"{path}: {problem}" for problem in problems)
+        groups = read_map(path).groups if not outcome.bundles and outcome.landmarks is not None else ()
+        drawing = _with(drawing, path.stem, outcome, reference, groups, aligned=aligned)
+    if drawing.landmarks is None and drawing.objects is None and not drawing.runs:
+        raise RecordingError(f"{paths[0]}: has neither poses nor landmarks to draw; run map or localize first")
+    scored = any(len(run.scored.rows) for run in drawing.runs)
+    if aligned and not scored and drawing.landmarks is not None and drawing.objects is not None:
+        mine, theirs = associate(drawing.landmarks, drawing.objects)
+        src, dst = drawing.landmarks.positions_xy[mine], drawing.objects.positions_xy[theirs]
+        drawing = _moved(drawing, fit(src, dst))
+    return drawing, losses
+
+
+def _with(
+    drawing: Drawing, name: str, outcome: Outcome, reference: Reference, groups: tuple[Group, ...], *, aligned: bool
+) -> Drawing:
+    if drawing.landmarks is None and outcome.landmarks is not None:
+        drawing = replace(drawing, landmarks=outcome.landmarks, groups=groups)
+    if drawing.objects is None:
+        drawing = replace(drawing, objects=reference.objects)
+    if not len(outcome.trajectory) and reference.trajectory is None:
+        return drawing
+    pairing = partial(interpolated, max_gap_ns=_MAX_GAP_NS)
+    scored = score(outcome.trajectory, reference, pairing, aligned=aligned)
+    estimate = outcome.trajectory
+    if scored.reference_from_estimate is not None and len(scored.rows):
+        moved = align(scored.reference_from_estimate, estimate.poses, estimate.covariances)
+        estimate = Trajectory(estimate.time_ns, *moved)
+        if not drawing.runs:
+            drawing = _moved(drawing, scored.reference_from_estimate)
+    run = Run(name, estimate, outcome.continuous, reference.trajectory, scored)
+    return replace(drawing, runs=(*drawing.runs, run))
+
+
+def _moved(drawing: Drawing, reference_from_map: Array) -> Drawing:
+    """The drawing with its map moved into the frame of the reference."""
+    turn = rotation(reference_from_map[2])
+    groups = tuple(
+        Group(group.landmark_ids, compose(reference_from_map, group.map_from_base)) for group in drawing.groups
+    )
+    landmarks = drawing.landmarks
+    if landmarks is not None:
+        landmarks = replace(
+            landmarks,
+            positions_xy=transform_points(reference_from_map, landmarks.positions_xy),
+            covariances=turn @ landmarks.covariances @ turn.T,
+        )
+    return replace(drawing, landmarks=landmarks, groups=groups)
+
+
+def breaks(trajectory: Trajectory, gap_ns: int = 2 * 10**9) -> Array:
+    """Positions (M, 2) of a trajectory to draw as a line, with NaN where it pauses for longer than `gap_ns`.
+
+    Nothing if it does nothing but pause.
+    """
+    after = np.flatnonzero(np.diff(trajectory.time_ns) > gap_ns) + 1
+    if len(after) >= len(trajectory) - 1:
+        return np.zeros((0, 2))
+    return np.insert(trajectory.poses[:, :2], after, np.nan, axis=0)

@@ -1,0 +1,139 @@
+"""One bundle of a log with results and all that led to it, for an explanation."""
+
+import contextlib
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.channels import (
+    CAMERA_IMAGE,
+    DETECTIONS,
+    MAP,
+    MATCH,
+    POSE,
+    POSE_COVARIANCE,
+    SCAN,
+    SCAN_OBJECTS,
+    SCENE_OBJECTS,
+    TF_STATIC,
+)
+from mcap_landmarks.errors import MessageError, RecordingError, UsageError
+from mcap_landmarks.evaluation.explain import Limits, Situation
+from mcap_landmarks.geometry.frames import FrameTree, apply, rigid
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.inspection.topic_roles import Choice, choose, message_type
+from mcap_landmarks.manifest import RUN
+from mcap_landmarks.messages.codec import Message, decode
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.recording.reader import Recording, open_recording
+from mcap_landmarks.stage import Channel, Connection
+from mcap_landmarks.vision.pixels import rgb_from_message
+
+_AROUND_NS = 3 * 10**9
+_BESIDE_NS = 10**9
+"""How far from the asked time the bundle may be, and from the bundle what its sensors saw."""
+_OF_BUNDLE = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, SCAN_OBJECTS)
+_BESIDE = (DETECTIONS, CAMERA_IMAGE, SCAN)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """What the sensors saw: the image (H, W, 3) of the detections, and the scan as points (N, 2) in the base frame."""
+
+    image: NDArray[np.uint8] | None = None
+    scan_xy: Array | None = None
+
+
+def read_situation(path: Path, at_ns: int) -> tuple[Situation, View]:
+    """The bundle of a log that is nearest in time, and what its sensors saw.
+
+    Raises:
+        RecordingError: the log cannot be read, or has no bundle within three seconds.
+    """
+    with open_recording(path) as recording:
+        channels = {c: channel for channel in (*_OF_BUNDLE, *_BESIDE) for c in _connections(recording, channel)}
+        found: dict[Channel[Any], dict[int, Message]] = {channel: {} for channel in (*_OF_BUNDLE, *_BESIDE)}
+        for raw in recording.messages(channels, at_ns - _AROUND_NS, at_ns + _AROUND_NS):
+            channel = channels[raw.connection]
+            with contextlib.suppress(MessageError):
+                message: Any = decode(message_type(channel, raw.connection), raw.data)
+                found[channel][message.stamp_ns or raw.log_time_ns] = message
+        bundles = found[MATCH] or found[SCENE_OBJECTS]
+        if not bundles:
+            raise RecordingError(
+                f"{path}: no bundle with scene objects within 3 s of {at_ns}; the log goes from {recording.start_ns} "
+                f"to {recording.end_ns}, and localize writes what is explained"
+            )
+        stamp_ns = min(bundles, key=lambda time_ns: abs(time_ns - at_ns))
+        return _situation(recording, found, stamp_ns), _view(recording, found, stamp_ns)
+
+
+def _situation(recording: Recording, found: dict[Channel[Any], dict[int, Any]], stamp_ns: int) -> Situation:
+    pose, spread = found[POSE].get(stamp_ns), found[POSE_COVARIANCE].get(stamp_ns)
+    config = json.loads(recording.metadata.get(RUN, {}).get("config", "{}"))
+    return Situation(
+        stamp_ns,
+        found[SCENE_OBJECTS].get(stamp_ns),
+        found[MATCH].get(stamp_ns),
+        _once(recording, MAP),
+        None if pose is None else pose.pose,
+        None if spread is None else spread.planar_covariance,
+        found[SCAN_OBJECTS].get(stamp_ns),
+        _nearest(found[DETECTIONS], stamp_ns),
+        Limits.of(config.get("localize", {})),
+    )
+
+
+def _view(recording: Recording, found: dict[Channel[Any], dict[int, Any]], stamp_ns: int) -> View:
+    detections = _nearest(found[DETECTIONS], stamp_ns)
+    image = _nearest(found[CAMERA_IMAGE], stamp_ns if detections is None else detections.stamp_ns)
+    pixels = None
+    if image is not None:
+        with contextlib.suppress(MessageError):
+            pixels = rgb_from_message(image)
+    scene = found[SCENE_OBJECTS].get(stamp_ns)
+    scan = found[SCAN].get(stamp_ns)
+    if scan is None or scene is None:
+        return View(pixels)
+    return View(pixels, _points(recording, scan, scene.frame_id))
+
+
+def _points(recording: Recording, scan: LaserScan, base: str) -> Array:
+    """Where the beams ended (N, 2), in the base frame if transforms lead there, else in the scanner's own."""
+    inside = np.isfinite(scan.ranges_m) & (scan.ranges_m >= scan.range_min_m) & (scan.ranges_m <= scan.range_max_m)
+    rows = np.flatnonzero(inside)
+    angle, range_m = scan.angle_min_rad + rows * scan.angle_increment_rad, scan.ranges_m[rows].astype(np.float64)
+    points = np.column_stack([range_m * np.cos(angle), range_m * np.sin(angle), np.zeros(len(rows))])
+    edges = [
+        (step.frame_id, step.child_frame_id, rigid(step.translation_m, step.rotation_xyzw))
+        for connection in recording.connections(TF_STATIC.topic)
+        for raw in recording.messages([connection])
+        for step in decode(TF_STATIC.message, raw.data).transforms
+    ]
+    with contextlib.suppress(RecordingError):
+        points = apply(FrameTree.of(edges).lookup(base, scan.frame_id), points)
+    return points[:, :2]
+
+
+def _connections(recording: Recording, channel: Channel[Any]) -> Iterable[Connection]:
+    """The connections that play a channel's part; none where several could, since one too many would mislead."""
+    try:
+        return choose(recording, channel, Choice())
+    except UsageError:
+        return ()
+
+
+def _once(recording: Recording, channel: Channel[Any]) -> Any:  # noqa: ANN401 - of the channel's type
+    connections = recording.connections(channel.topic)
+    raw = next(recording.messages(connections), None) if connections else None
+    return None if raw is None else decode(channel.message, raw.data)
+
+
+def _nearest(messages: dict[int, Any], stamp_ns: int) -> Any:  # noqa: ANN401 - of the channel's type
+    time_ns = min(messages, key=lambda time_ns: abs(time_ns - stamp_ns), default=None)
+    return None if time_ns is None or abs(time_ns - stamp_ns) > _BESIDE_NS else messages[time_ns]

@@ -1,0 +1,165 @@
+"""One recording as the bundles that a stage reads, in one pass."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from mcap_landmarks.channels import CAMERA_INFO, ODOMETRY, TF_STATIC
+from mcap_landmarks.errors import MessageError, RecordingError
+from mcap_landmarks.inspection.topic_roles import ROLES, Choice, choose, could_be, message_type
+from mcap_landmarks.maps.scene_objects import usable
+from mcap_landmarks.messages.codec import Message, decode
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.recording.association import Association, associate
+from mcap_landmarks.recording.layered_log import Readable
+from mcap_landmarks.recording.odometry_buffer import odometry_from
+from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage
+
+HELD = (CAMERA_INFO, TF_STATIC)
+"""Channels of which a bundle gets the latest message so far, however old."""
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """What of a recording is read: topics by role, and log times from `start_ns` on and before `end_ns`."""
+
+    choice: Choice = field(default_factory=Choice)
+    start_ns: int | None = None
+    end_ns: int | None = None
+
+
+@dataclass(slots=True)
+class Reading:
+    """What became of a recording's messages: what was associated, dropped by rule, or lost to damage."""
+
+    association: Association = field(default_factory=Association)
+    dropped: Counter[str] = field(default_factory=Counter)
+    losses: list[str] = field(default_factory=list)
+    unreadable: Counter[str] = field(default_factory=Counter)
+    topics: dict[str, str] = field(default_factory=dict)
+    """The log's own topic for a channel's."""
+
+    def lose(self, topic: str, log_time_ns: int, reason: str) -> None:
+        """Count a message that cannot be read; the first of a topic is told in full."""
+        self.unreadable[topic] += 1
+        if self.unreadable[topic] == 1:
+            self.losses.append(f"{topic} at {log_time_ns}: {reason}")
+
+    def close(self, losses: Iterable[str]) -> None:
+        """Sum up when everything was read; `losses` are the recording's own."""
+        self.losses.extend(
+            f"{topic}: {count} messages could not be decoded in all"
+            for topic, count in self.unreadable.items()
+            if count > 1
+        )
+        self.losses.extend(losses)
+
+    def notes(self) -> dict[str, int]:
+        """Everything that was left out by rule, in words, with its count; nothing where nothing was."""
+        association = self.association
+        found = Counter(self.dropped)
+        found["bundles without odometry at their time"] += association.without_odometry
+        found["odometry messages whose time goes backwards"] += association.odometry_out_of_order
+        found["odometry messages with numbers that are not finite"] += association.odometry_not_finite
+        for topic, count in association.alone.items():
+            found[f"bundles without {self.topics.get(topic, topic)} at their time"] += count
+        for topic, count in association.unpaired.items():
+            found[f"messages of {self.topics.get(topic, topic)} that were nearest to no bundle"] += count
+        return {reason: count for reason, count in sorted(found.items()) if count}
+
+
+def inputs_of(
+    recording: Readable, reads: Iterable[Channel[Any]], required: Iterable[Channel[Any]], choice: Choice
+) -> dict[Connection, Channel[Any]]:
+    """The connections that a stage reads, each with the channel it stands for.
+
+    Raises:
+        RecordingError: a required input is missing or has no messages.
+        UsageError: see `choose`.
+    """
+    found: dict[Connection, Channel[Any]] = {}
+    counts = {entry.connection: entry.count for entry in recording.channels}
+    needed = set(required)
+    for channel in reads:
+        connections = choose(recording, channel, choice)
+        for connection in connections:
+            if found.get(connection, TF_STATIC) == TF_STATIC:  # what is also odometry gives transforms all the same
+                found[connection] = channel
+        if channel in needed and not sum(counts[connection] for connection in connections):
+            raise RecordingError(_missing(recording, channel, bool(connections)))
+    return found
+
+
+def _missing(recording: Readable, channel: Channel[Any], empty: bool) -> str:
+    role = ROLES.get(channel)
+    if empty:
+        name = role.name if role else channel.topic
+        return f"{recording.path}: the {name} topic has no messages; record it, or choose another log"
+    if role is None:
+        return (
+            f"{recording.path}: there is no {channel.topic}; run the stage that writes it first, or read another topic "
+            f"as it with --remap TOPIC={channel.topic}"
+        )
+    kinds = " or ".join(role.types)
+    remedy = f"choose a topic with {role.option}, or take a log that has one, such as {channel.topic}"
+    return f"{recording.path}: there is no {role.name} ({kinds}); {could_be(recording, channel) or remedy}"
+
+
+def read_bundles(
+    raws: Iterable[RawMessage],
+    inputs: Mapping[Connection, Channel[Any]],
+    reads: Sequence[Channel[Any]],
+    reading: Reading,
+) -> Iterator[Bundle]:
+    """The bundles of messages by log time, one per message of the first channel of `reads`.
+
+    They wait for odometry if `reads` has it, for transforms and camera information if the recording has any, and get
+    of every other channel of `reads` the message nearest in time. `reading` is kept up to date.
+
+    A message that cannot be decoded is a loss, an unusable object is dropped; both are counted.
+    """
+    reading.topics.update({channel.topic: connection.topic for connection, channel in inputs.items()})
+    present = {*inputs.values()} | {TF_STATIC for entry in inputs if entry.message_type == TFMessage.ROS_TYPE}
+    others = [channel for channel in reads[1:] if channel != ODOMETRY and channel in present]
+    return associate(
+        _decoded(raws, inputs, reading),
+        reads[0],
+        reading.association,
+        with_odometry=ODOMETRY in reads,
+        held=[channel for channel in others if channel in HELD],
+        beside=[channel for channel in others if channel not in HELD],
+    )
+
+
+def held_before(
+    recording: Readable, inputs: Mapping[Connection, Channel[Any]], start_ns: int | None
+) -> Iterator[RawMessage]:
+    """Messages of held inputs from before the time that reading starts at: transforms most often come only once."""
+    held = [connection for connection, channel in inputs.items() if channel in HELD]
+    if start_ns is not None and held:
+        yield from recording.messages(held, None, start_ns)
+
+
+def _decoded(
+    raws: Iterable[RawMessage], inputs: Mapping[Connection, Channel[Any]], reading: Reading
+) -> Iterator[tuple[Channel[Any], int, Message]]:
+    for raw in raws:
+        channel = inputs.get(raw.connection)
+        if channel is None:
+            continue
+        try:
+            message: Message = decode(message_type(channel, raw.connection), raw.data)
+        except MessageError as error:
+            reading.lose(raw.connection.topic, raw.log_time_ns, str(error))
+            continue
+        if isinstance(message, SceneObjects):
+            message = usable(message, reading.dropped)
+        if isinstance(message, TFMessage):  # one message may hold odometry and where a sensor is
+            yield TF_STATIC, raw.log_time_ns, message
+        else:
+            yield channel, raw.log_time_ns, message
+        odometry = odometry_from(message) if channel == ODOMETRY else None
+        if odometry is not None and odometry is not message:
+            yield ODOMETRY, raw.log_time_ns, odometry

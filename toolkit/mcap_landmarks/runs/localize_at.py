@@ -1,0 +1,108 @@
+"""Localize one moment of a recording: the answer that the whole run has for the bundle nearest to it."""
+
+import contextlib
+import dataclasses
+import tempfile
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mcap_landmarks.channels import MATCH, POSE, POSE_COVARIANCE
+from mcap_landmarks.errors import UsageError
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.messages.match import LandmarkMatch
+from mcap_landmarks.recording.association import WINDOW_NS
+from mcap_landmarks.runs.bundles import Reading, inputs_of, read_bundles
+from mcap_landmarks.runs.plan import Request, Step, missing_stages, plan
+from mcap_landmarks.runs.session import Bench, open_bench
+from mcap_landmarks.runs.stage_runner import bundle_count, counted, naming
+from mcap_landmarks.stage import Omission, Stamped, Watch, unwatched
+from mcap_landmarks.stages import find_stage
+
+_LOCALIZE = "localize"
+
+
+@dataclass(slots=True)
+class Answer:
+    """What localization says of one bundle: its match and, where localized, pose (3,) and covariance (3, 3).
+
+    The thesis's method has no covariance; its pose then has no heading either.
+    """
+
+    stamp_ns: int
+    match: LandmarkMatch
+    pose: Array | None = None
+    covariance: Array | None = None
+
+
+def localize_at(request: Request, time_ns: int, watch: Watch = unwatched) -> tuple[Answer, Reading]:
+    """The answer for the bundle nearest to a time, from everything that the span holds before it.
+
+    Where the log lacks scene objects and results, they are made of what is before that time, and not kept.
+
+    Raises:
+        UsageError: no bundle is within 2 s of that time, or a setting or file is missing or wrong.
+        RecordingError: the recording has no scene objects and nothing to make them from.
+    """
+    with tempfile.TemporaryDirectory(prefix="mcap-landmarks-") as folder:
+        parts = Path(folder)
+        with open_bench(request, parts, None) as bench:
+            before = missing_stages(find_stage(_LOCALIZE), bench.log)
+            if set(before) <= set(bench.log.results):
+                return _localized(bench, before, time_ns, watch)
+        end_ns = time_ns + 2 * WINDOW_NS
+        span = dataclasses.replace(request.span, end_ns=min(request.span.end_ns or end_ns, end_ns))
+        with open_bench(dataclasses.replace(request, span=span), parts, None) as bench:
+            return _localized(bench, before, time_ns, watch)
+
+
+def _localized(bench: Bench, before: list[str], time_ns: int, watch: Watch) -> tuple[Answer, Reading]:
+    *steps, last = plan(bench.request, bench.log, [*before, _LOCALIZE])
+    for step in steps:
+        bench.work(step, watch)
+    reading = Reading()
+    nearest: Answer | None = None
+    with contextlib.closing(_results(bench, last, reading, watch)) as results:
+        for answer in _answers(results):
+            if nearest is None or abs(answer.stamp_ns - time_ns) < abs(nearest.stamp_ns - time_ns):
+                nearest = answer
+            if answer.stamp_ns > time_ns + WINDOW_NS:
+                break
+    if nearest is None or abs(nearest.stamp_ns - time_ns) > WINDOW_NS:
+        known = "there is none at all" if nearest is None else f"the nearest is at {nearest.stamp_ns}"
+        raise UsageError(f"{bench.log.path}: no bundle within 2 s of {time_ns}; {known}")
+    return nearest, reading
+
+
+def _results(bench: Bench, step: Step, reading: Reading, watch: Watch) -> Generator[Stamped | Omission, None, None]:
+    view, span = bench.view(step.record), bench.request.span
+    inputs = inputs_of(view, step.stage.reads, step.stage.reads[:1], span.choice)
+    count = bundle_count(step.stage, view, span)
+    with watch(f"{step.stage.name} {view.path.name}", count, "bundles") as progress:
+        raws = view.messages(tuple(inputs), span.start_ns, span.end_ns)
+        raws = counted(raws, inputs, step.stage.reads[0], progress)
+        bundles = read_bundles(raws, inputs, step.stage.reads, reading)
+        try:
+            yield from naming(view.path, step.stage.process(bundles, step.config, step.files))
+        finally:
+            reading.close(view.losses)
+
+
+def _answers(results: Iterator[Stamped | Omission]) -> Iterator[Answer]:
+    """One answer per match among the results, whole with the pose that follows it."""
+    answer: Answer | None = None
+    for result in results:
+        if isinstance(result, Omission):
+            continue
+        message: Any = result.message
+        if result.channel == MATCH:
+            if answer is not None:
+                yield answer
+            answer = Answer(message.stamp_ns or result.log_time_ns, message)
+        elif answer is not None and result.channel == POSE:
+            answer.pose = message.pose
+        elif answer is not None and result.channel == POSE_COVARIANCE:
+            answer.covariance = message.planar_covariance
+    if answer is not None:
+        yield answer

@@ -1,0 +1,77 @@
+"""Stages over one recording: their results as new channels beside the input's messages."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap_landmarks.atomic import check_target
+from mcap_landmarks.errors import UsageError
+from mcap_landmarks.manifest import Outcome
+from mcap_landmarks.runs.output_writer import assemble
+from mcap_landmarks.runs.plan import Request, in_order, missing_stages, plan
+from mcap_landmarks.runs.session import StageRun, open_bench, parts_folder
+from mcap_landmarks.stage import Watch, unwatched
+from mcap_landmarks.stages import find_stage
+
+
+@dataclass(frozen=True, slots=True)
+class LogRun:
+    """What became of one log: where the output is, what each stage did, and what is to be said about the log."""
+
+    recording: Path
+    output: Path
+    stages: tuple[StageRun, ...]
+    notes: tuple[str, ...] = ()
+    losses: tuple[str, ...] = ()
+
+    @property
+    def outcome(self) -> Outcome:
+        """What came of the last stage."""
+        return self.stages[-1].outcome
+
+
+def run_stages(
+    request: Request,
+    output: Path,
+    names: Sequence[str],
+    verb: str,
+    watch: Watch = unwatched,
+    *,
+    lacking: bool = False,
+) -> LogRun:
+    """Run exactly these stages over a log, in their order; results that are there already are reused.
+
+    `lacking` puts those before them whose results they need and the log does not have as its own.
+
+    Raises:
+        ToolkitError: input or output cannot be used; of the output nothing is left behind.
+    """
+    names = in_order(names)
+    check_output(request.recording, output)
+    with parts_folder(output) as parts, open_bench(request, parts, output) as bench:
+        if lacking:
+            before = [other for name in names for other in missing_stages(find_stage(name), bench.log)]
+            names = in_order([*before, *names])
+        runs = [bench.work(step, watch) for step in plan(request, bench.log, names)]
+        notes, losses = assemble(bench, output, verb, [bench.log.recording.fingerprint()], watch)
+        return LogRun(request.recording, output, tuple(runs), *told(runs, notes, losses))
+
+
+def told(
+    runs: Sequence[StageRun], notes: Sequence[str], losses: Sequence[str]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What is to be said of a log: notes and losses, of its stages and beside them, each once."""
+    noted = [note for run in runs for note in run.outcome.notes]
+    lost = [loss for run in runs for loss in run.outcome.losses]
+    return tuple(dict.fromkeys([*noted, *notes])), tuple(dict.fromkeys([*lost, *losses]))
+
+
+def check_output(recording: Path, output: Path) -> None:
+    """Refuse an output that cannot be written or is the input.
+
+    Raises:
+        UsageError: as it says.
+    """
+    check_target(output)
+    if output.resolve() == recording.resolve():
+        raise UsageError(f"{output} is the input itself; write to another file")

@@ -1,0 +1,173 @@
+"""One log under work: results are taken from where they lie, or made and kept beside the output until it is whole."""
+
+import contextlib
+import shutil
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mcap_landmarks.channels import TF
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.manifest import Outcome, StageRecord
+from mcap_landmarks.recording.layered_log import Layer, View, result_layers
+from mcap_landmarks.recording.reader import Recording, open_recording
+from mcap_landmarks.runs.plan import Log, Request, Step
+from mcap_landmarks.runs.stage_runner import bundle_count, run_step
+from mcap_landmarks.stage import Watch
+
+
+@dataclass(frozen=True, slots=True)
+class StageRun:
+    """What became of one stage: `state` is `ran` or `reused`, and `reason` says why, in words."""
+
+    stage: str
+    state: str
+    reason: str
+    outcome: Outcome
+
+
+@contextlib.contextmanager
+def parts_folder(output: Path) -> Iterator[Path]:
+    """Where finished stages lie until the output is whole: `.OUTPUT.parts`, which goes when the block ends well.
+
+    When it does not, what is finished stays for the next run.
+    """
+    folder = output.with_name(f".{output.name}.parts")
+    is_whole = False
+    try:
+        yield folder
+        is_whole = True
+    finally:
+        if folder.is_dir() and (is_whole or not any(folder.iterdir())):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def part_file(folder: Path, record: StageRecord) -> Path:
+    """The file for the results of a record, in a folder that is there then.
+
+    Raises:
+        RecordingError: the folder cannot be made.
+    """
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise RecordingError(
+            f"{folder}: cannot be made ({error.strerror}); choose another place to write to"
+        ) from error
+    return folder / record.file_name
+
+
+@contextlib.contextmanager
+def open_bench(request: Request, parts: Path, output: Path | None) -> Iterator["Bench"]:
+    """A bench for one log, with the results that lie in the log, in an earlier `output` and among the `parts`.
+
+    Raises:
+        RecordingError: the log cannot be read.
+    """
+    with ExitStack() as stack:
+        log = Log(stack.enter_context(open_recording(request.recording)), request.span)
+        yield Bench(stack, request, log, parts, output)
+
+
+class Bench:
+    """One log and its results so far; made by `open_bench`."""
+
+    def __init__(self, stack: ExitStack, request: Request, log: Log, parts: Path, output: Path | None) -> None:
+        self.request, self.log = request, log
+        self.results = dict(log.results)
+        self.of_this_run: set[str] = set()
+        self._stack, self._parts = stack, parts
+        self.earlier: Recording | None = None
+        self._stores: list[tuple[str, dict[str, Layer]]] = [("the log", log.results)]
+        if output is not None and output.is_file():
+            with contextlib.suppress(RecordingError):  # what is no recording has no results
+                self.earlier = self._open(output)
+                self._stores.append(("the earlier output", result_layers(self.earlier)))
+
+    def view(self, record: StageRecord) -> View:
+        """What a stage sees: the log, with the results that its record says it reads."""
+        read = [self.results[name] for name in sorted(record.inputs) if name in self.results]
+        topics = {entry.connection.topic for layer in read for entry in layer.channels}
+        return View(self.log.path, [self.own_without(topics), *read])
+
+    def work(self, step: Step, watch: Watch) -> StageRun:
+        """The results of a step: found, or made now."""
+        found = None if self.request.force else self.find(step.record)
+        if found is not None:
+            return found
+        reason, (stage, span) = self._why(step.record), (step.stage, self.request.span)
+        view, target = self.view(step.record), part_file(self._parts, step.record)
+        with watch(f"{stage.name} {self.log.path.name}", bundle_count(stage, view, span), "bundles") as progress:
+            record = run_step(step, view, span, self.request.thinning, target, progress)
+        self.take(target)
+        return StageRun(stage.name, "ran", reason, record.outcome)
+
+    def find(self, record: StageRecord) -> StageRun | None:
+        """The results with the key of a record, taken from where they lie; None if they lie nowhere."""
+        unfinished = self._results_in(self._parts / record.file_name)
+        for place, layers in [("what an unfinished run left", unfinished), *self._stores]:
+            layer = layers.get(record.stage)
+            known = layer.record if layer is not None else None
+            if layer is not None and known is not None and known.key == record.key and not known.is_cut:
+                self._show({record.stage: layer})
+                return StageRun(record.stage, "reused", f"the same results are in {place}", known.outcome)
+        return None
+
+    def _results_in(self, path: Path) -> dict[str, Layer]:
+        """The results in a file, none if it is no recording."""
+        if path.is_file():
+            with contextlib.suppress(RecordingError):
+                return result_layers(self._open(path))
+        return {}
+
+    def take(self, part: Path) -> None:
+        """Show the results in a part to the next stages."""
+        self._show(result_layers(self._open(part)))
+
+    def kept_results(self) -> tuple[list[Layer], list[str]]:
+        """The results for an output, by stage, and the stages whose results are left out.
+
+        These are such as were made from results that are not the ones for the output. Where only results are asked for,
+        those of the run's own stages are meant.
+        """
+        kept, stale = dict(sorted(self.results.items())), list[str]()
+        if self.request.results_only:
+            kept = {name: layer for name, layer in kept.items() if name in self.of_this_run}
+        while True:
+            keys = {name: layer.record.key for name, layer in kept.items() if layer.record is not None}
+            wrong = [
+                name
+                for name, layer in kept.items()
+                if layer.record is not None
+                and any(source in stale or keys.get(source, key) != key for source, key in layer.record.inputs.items())
+            ]
+            if not wrong:
+                return list(kept.values()), stale
+            stale += wrong
+            for name in wrong:
+                del kept[name]
+
+    def own_without(self, topics: Collection[str]) -> Layer:
+        """The log's own messages, without those on topics that results are on; transforms stand beside each other."""
+        own, gone = self.log.own, {*topics} - {TF.topic}
+        return replace(own, channels=tuple(entry for entry in own.channels if entry.connection.topic not in gone))
+
+    def _show(self, layers: Mapping[str, Layer]) -> None:
+        self.results.update(layers)
+        self.of_this_run.update(layers)
+
+    def _open(self, path: Path) -> Recording:
+        return self._stack.enter_context(open_recording(path))
+
+    def _why(self, record: StageRecord) -> str:
+        """Why a stage has to run, in words: what became other since the results that there are."""
+        if self.request.force:
+            return "--force"
+        for place, layers in reversed(self._stores):
+            layer = layers.get(record.stage)
+            if layer is not None and layer.record is not None:
+                if layer.record.is_cut and layer.record.key == record.key:
+                    return f"the results in {place} are only a part"
+                return f"{record.difference(layer.record)} since the results in {place}"
+        return "there were no results"

@@ -1,0 +1,144 @@
+"""Leave out images that come faster, or from nearer to each other, than anyone needs."""
+
+import math
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mcap_landmarks.channels import ODOMETRY
+from mcap_landmarks.errors import MessageError, UsageError
+from mcap_landmarks.geometry.se2 import Array, between
+from mcap_landmarks.inspection.topic_roles import message_type
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.recording.odometry_buffer import odometry_from
+from mcap_landmarks.stage import Connection, RawMessage
+
+TOO_FAST, TOO_NEAR = "images left out by --image-rate", "images left out by --every"
+
+
+@dataclass(frozen=True, slots=True)
+class Thinning:
+    """Which images are wanted: at most `rate_hz`, and only after the robot moved `every_m` or turned `every_rad`."""
+
+    rate_hz: float | None = None
+    every_m: float | None = None
+    every_rad: float | None = None
+
+    @property
+    def by_motion(self) -> bool:
+        """Whether odometry has a say."""
+        return self.every_m is not None or self.every_rad is not None
+
+    def options(self) -> dict[str, object]:
+        """For the manifest: what was asked for."""
+        given = {"image_rate_hz": self.rate_hz, "every_m": self.every_m, "every_rad": self.every_rad}
+        return {name: value for name, value in given.items() if value is not None}
+
+
+def parse_thinning(rate_hz: float | None, every: str | None) -> Thinning:
+    """The thinning of the texts of two options, such as `0.2m,5deg`.
+
+    Raises:
+        UsageError: a number is not above zero, or a unit is neither m nor deg.
+    """
+    if rate_hz is not None and not (rate_hz > 0 and math.isfinite(rate_hz)):
+        raise UsageError(f"--image-rate {rate_hz:g}: give images per second, above 0")
+    given: dict[str, float] = {}
+    for part in every.split(",") if every else ():
+        for unit in ("deg", "m"):
+            if part.strip().endswith(unit):
+                given[unit] = _number(part.strip().removesuffix(unit))
+                break
+        else:
+            given[""] = 0.0
+    if not all(unit and value > 0 and math.isfinite(value) for unit, value in given.items()):
+        raise UsageError(f"--every {every}: write metres, degrees or both, above 0, such as 0.2m,5deg")
+    degrees = given.get("deg")
+    return Thinning(rate_hz, given.get("m"), None if degrees is None else math.radians(degrees))
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
+
+def thin(
+    raws: Iterable[RawMessage],
+    images: Collection[Connection],
+    odometry: Collection[Connection],
+    thinning: Thinning,
+    dropped: Counter[str],
+) -> Iterator[RawMessage]:
+    """The messages without the images that nobody wants, which are counted in `dropped`; nothing else is left out.
+
+    The rate is kept on the mean, by log time, and jitter costs no images. Motion is that of the latest odometry before
+    an image; as long as there is none, every image is taken.
+    """
+    rate = _Rate(thinning.rate_hz) if thinning.rate_hz else None
+    motion = _Motion(thinning) if thinning.by_motion else None
+    for raw in raws:
+        if motion and raw.connection in odometry:
+            motion.follow(raw)
+        if raw.connection in images:
+            if rate and not rate.is_due(raw.log_time_ns):
+                dropped[TOO_FAST] += 1
+                continue
+            if motion and not motion.has_come_far():
+                dropped[TOO_NEAR] += 1
+                continue
+            if rate:
+                rate.take(raw.log_time_ns)
+            if motion:
+                motion.take()
+        yield raw
+
+
+class _Rate:
+    """A grid of moments from the first image on; each takes the first image that is nearest to it of them all."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._period_ns = round(1e9 / rate_hz)
+        self._start_ns: int | None = None
+        self._taken = -1
+
+    def is_due(self, time_ns: int) -> bool:
+        return self._nearest(time_ns) > self._taken
+
+    def take(self, time_ns: int) -> None:
+        self._taken = self._nearest(time_ns)
+
+    def _nearest(self, time_ns: int) -> int:
+        if self._start_ns is None:
+            self._start_ns = time_ns
+        return (2 * (time_ns - self._start_ns) + self._period_ns - 1) // (2 * self._period_ns)
+
+
+class _Motion:
+    """How far the robot has come since the last image that was taken."""
+
+    def __init__(self, thinning: Thinning) -> None:
+        self._thinning = thinning
+        self._now: Array | None = None
+        self._taken: Array | None = None
+
+    def follow(self, raw: RawMessage) -> None:
+        try:
+            found = odometry_from(decode(message_type(ODOMETRY, raw.connection), raw.data))
+        except MessageError:
+            return  # the stage that reads odometry counts it
+        if found is not None and np.isfinite(found.pose).all():
+            self._now = found.pose
+
+    def has_come_far(self) -> bool:
+        if self._now is None or self._taken is None:
+            return True
+        forward, left, turn = between(self._taken, self._now).tolist()
+        far = self._thinning.every_m is not None and math.hypot(forward, left) >= self._thinning.every_m
+        return far or (self._thinning.every_rad is not None and abs(turn) >= self._thinning.every_rad)
+
+    def take(self) -> None:
+        self._taken = self._now

@@ -1,0 +1,286 @@
+"""One SQLite file of a ROS 2 bag: its topics, definitions and messages, also where it is damaged."""
+
+import contextlib
+import sqlite3
+from array import array
+from collections import Counter
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import zstandard
+
+from mcap_landmarks.errors import MessageError, RecordingError
+from mcap_landmarks.messages.qos import KEY
+from mcap_landmarks.sources._ros2_types import check_fits, definition_in, known_distribution
+from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
+
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+_REPORT_BYTES = 1 << 20
+_FIRST, _LAST = -(2**63), 2**63 - 1
+_Row = tuple[int, int, int, bytes]  # time, row id, topic id, data
+_Key = tuple[int, int]  # time, row id
+
+
+@dataclass(frozen=True, slots=True)
+class _Topic:
+    """A row of the table of topics. distribution: where the definition was taken from, None if the bag has it."""
+
+    connection: Connection
+    distribution: str | None
+    problem: str | None
+
+
+def unpacked(data: bytes | memoryview) -> bytes | memoryview:
+    """A payload without the compression that a bag may have put on each message; CDR never begins like zstd.
+
+    Raises:
+        MessageError: it is compressed and damaged.
+    """
+    if data[:4] != ZSTD_MAGIC:
+        return data
+    stream = zstandard.ZstdDecompressor().decompressobj()
+    try:
+        content = stream.decompress(data)
+    except zstandard.ZstdError as error:
+        raise MessageError(f"{len(data)} bytes cannot be decompressed ({error})") from error
+    if not stream.eof:
+        raise MessageError(f"{len(data)} bytes cannot be decompressed (they are cut)")
+    return content
+
+
+class Db3Log:
+    """The log in one file. `distribution` gives the types that the file does not define."""
+
+    def __init__(self, path: Path, distribution: str | None) -> None:
+        self.losses: list[str] = []
+        self._path = path
+        try:
+            with _database(path) as database:
+                self._read_topics(database, distribution)
+        except (sqlite3.DatabaseError, UnicodeDecodeError, KeyError, TypeError) as error:
+            raise RecordingError(f"{path} is no ROS 2 bag, or too damaged to read: {error}; copy it again") from error
+
+    def _read_topics(self, database: sqlite3.Connection, distribution: str | None) -> None:
+        if not {"topics", "messages"} <= _columns(database, "sqlite_master", "name"):
+            raise RecordingError(f"{self._path} has no tables of topics and messages; it is no ROS 2 bag")
+        definitions = _definitions(database)
+        own = distribution or _distribution(database)
+        self._topics = {
+            int(row["id"]): _topic(dict(row), definitions, own) for row in _rows(database, "SELECT * FROM topics")
+        }
+        counts = self._count(database)
+        self.channels = [
+            ChannelSummary(topic.connection, counts[key])
+            for key, topic in self._topics.items()
+            if counts[key] or not topic.problem
+        ]
+        orphans = sum(count for key, count in counts.items() if key not in self._topics)
+        if orphans:
+            self._lose(f"{orphans} messages belong to topics that are nowhere described")
+
+    def _count(self, database: sqlite3.Connection) -> Counter[int]:
+        counts: Counter[int] = Counter()
+        self.start_ns: int | None = None
+        self.end_ns: int | None = None
+        try:
+            counts.update(dict(database.execute("SELECT topic_id, count(*) FROM messages GROUP BY topic_id")))
+            if counts:
+                self.start_ns = _number(database.execute("SELECT min(timestamp) FROM messages").fetchone()[0])
+                self.end_ns = _number(database.execute("SELECT max(timestamp) FROM messages").fetchone()[0])
+        except sqlite3.DatabaseError as error:
+            self._damaged(error)
+            counts.clear()
+            times = array("q")
+            for time_ns, _, topic in _by_row(database):
+                counts[topic] += 1
+                times.append(time_ns)
+            self.start_ns, self.end_ns = min(times, default=None), max(times, default=None)
+        return counts
+
+    def _damaged(self, error: sqlite3.DatabaseError) -> None:
+        self._lose(f"it is cut or damaged ({error}); what lies before the damage was taken")
+
+    def _lose(self, text: str) -> None:
+        text = f"{self._path.name}: {text}"
+        if text not in self.losses:
+            self.losses.append(text)
+
+    def messages(
+        self,
+        connections: Collection[Connection] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+        progress: Progress | None = None,
+    ) -> Iterator[RawMessage]:
+        """See `Log`.
+
+        Raises:
+            RecordingError: a wanted topic has no definition, or messages that do not fit the one of the distribution.
+        """
+        wanted = self._wanted(connections)
+        first, end = _FIRST if start_ns is None else start_ns, _LAST if end_ns is None else end_ns
+        read = 0
+        for time_ns, _, key, data in self._ordered(first, end):
+            if not isinstance(data, bytes) or _number(time_ns) != time_ns:
+                self._lose("rows without a sound time and payload are left out")
+                continue
+            read += len(data)
+            if progress and read >= _REPORT_BYTES:
+                progress(read)
+                read = 0
+            if key in wanted:
+                payload = self._payload(wanted[key], data)
+                if payload is not None:
+                    yield RawMessage(wanted[key].connection, time_ns, time_ns, 0, payload)
+        if progress:
+            progress(read)
+
+    def _wanted(self, connections: Collection[Connection] | None) -> dict[int, _Topic]:
+        wanted = {
+            key: topic for key, topic in self._topics.items() if connections is None or topic.connection in connections
+        }
+        counted = {summary.connection for summary in self.channels}
+        for topic in wanted.values():
+            if topic.problem and topic.connection in counted:
+                raise RecordingError(f"{self._path}: {topic.problem}")
+        return wanted
+
+    def _payload(self, topic: _Topic, data: bytes) -> bytes | memoryview | None:
+        connection = topic.connection
+        try:
+            payload = unpacked(data)
+        except MessageError as error:
+            self._lose(f"{connection.topic}: {error}; such messages are left out")
+            return None
+        if topic.distribution:
+            try:
+                check_fits(topic.distribution, connection.message_type, payload)
+            except MessageError as error:
+                raise RecordingError(
+                    f"{self._path}: topic {connection.topic}: {error}; name the distribution it was recorded with: "
+                    "--distro NAME, or leave the topic out with --topics"
+                ) from error
+        return payload
+
+    def _ordered(self, first_ns: int, end_ns: int) -> Iterator[_Row]:
+        """Rows by time, from the file's index while it lasts, from the rows themselves where that is damaged."""
+        last: _Key = (first_ns, _FIRST)
+        with _database(self._path) as database:
+            try:
+                for row in _by_time(database, first_ns, end_ns):
+                    yield row
+                    last = row[:2]
+            except sqlite3.DatabaseError as error:
+                self._damaged(error)
+                yield from _salvaged(database, last, end_ns)
+
+
+@contextlib.contextmanager
+def _database(path: Path) -> Iterator[sqlite3.Connection]:
+    """The file, opened so that neither it nor its folder changes; a cut file opens too, as far as it goes."""
+    log = path.with_name(f"{path.name}-wal")
+    mode = "mode=ro" if log.exists() and log.stat().st_size else "immutable=1"
+    database = sqlite3.connect(f"{path.resolve().as_uri()}?{mode}", uri=True)
+    database.row_factory = sqlite3.Row
+    with contextlib.closing(database):
+        try:
+            database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+        except sqlite3.DatabaseError:
+            database.execute("PRAGMA writable_schema=ON")  # SQLite then reads a file that is shorter than it says
+        yield database
+
+
+def _number(value: object) -> int:
+    """A time as recordings can hold it, zero for anything else that a damaged row may have there."""
+    return value if isinstance(value, int) and value >= 0 else 0
+
+
+def _rows(database: sqlite3.Connection, query: str) -> list[sqlite3.Row]:
+    return database.execute(query).fetchall()
+
+
+def _columns(database: sqlite3.Connection, table: str, column: str) -> set[str]:
+    return {str(row[column]) for row in _rows(database, f"SELECT {column} FROM {table}")}  # noqa: S608 - our own names
+
+
+def _definitions(database: sqlite3.Connection) -> dict[str, tuple[str, str]]:
+    """Encoding and text by type, of those that the file defines."""
+    if "message_definitions" not in _columns(database, "sqlite_master", "name"):
+        return {}
+    found = _rows(database, "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
+    return {row[0]: (row[1], row[2]) for row in found if row[1] in {"ros2msg", "ros2idl"}}
+
+
+def _distribution(database: sqlite3.Connection) -> str | None:
+    """What the file itself calls the distribution it was recorded with, if that is one."""
+    if "schema" not in _columns(database, "sqlite_master", "name"):
+        return None
+    names = [str(dict(row).get("ros_distro", "")) for row in _rows(database, "SELECT * FROM schema")]
+    return next((name for name in names if known_distribution(name)), None)
+
+
+def _topic(row: dict[str, str], definitions: dict[str, tuple[str, str]], distribution: str | None) -> _Topic:
+    name, message_type = row["name"], row["type"]
+    metadata = {KEY: row.get("offered_qos_profiles") or ""}
+    if digest := row.get("type_description_hash"):
+        metadata["topic_type_hash"] = digest
+    problem = None
+    if row["serialization_format"] != "cdr":
+        problem = f"topic {name} is {row['serialization_format']}, not CDR; leave it out with --topics"
+    if message_type in definitions:
+        encoding, text = definitions[message_type]
+        return _Topic(Connection(name, message_type, text.encode(), encoding, metadata=metadata), None, problem)
+    text_or_none = definition_in(distribution, message_type) if distribution else None
+    if problem is None and text_or_none is None:
+        who = (
+            f"neither the file nor {distribution} has"
+            if distribution
+            else "the file, which names no distribution, lacks"
+        )
+        problem = (
+            f"topic {name}: {who} the definition of {message_type}; name the distribution it was recorded with, such "
+            "as --distro humble, or leave the topic out with --topics"
+        )
+    return _Topic(
+        Connection(name, message_type, (text_or_none or "").encode(), metadata=metadata), distribution, problem
+    )
+
+
+def _by_time(database: sqlite3.Connection, first_ns: int, end_ns: int) -> Iterator[_Row]:
+    within, order = "FROM messages WHERE timestamp >= ? AND timestamp < ?", "ORDER BY timestamp, rowid"
+    whole = f"SELECT timestamp, rowid, topic_id, data {within} {order}"
+    plan = database.execute(f"EXPLAIN QUERY PLAN {whole}", (first_ns, end_ns)).fetchall()
+    if not any("TEMP B-TREE" in row[3] for row in plan):
+        yield from map(tuple, database.execute(whole, (first_ns, end_ns)))
+        return
+    keys = database.execute(f"SELECT timestamp, rowid {within} {order}", (first_ns, end_ns))
+    yield from _fetched(database, ((int(row[0]), int(row[1])) for row in keys))
+
+
+def _fetched(database: sqlite3.Connection, keys: Iterator[_Key]) -> Iterator[_Row]:
+    """Rows one by one: sorting them whole would take their payloads along."""
+    for time_ns, row in keys:
+        found = database.execute("SELECT topic_id, data FROM messages WHERE rowid = ?", (row,)).fetchone()
+        if found is not None:  # an index may name rows that are gone
+            yield time_ns, row, found[0], found[1]
+
+
+def _by_row(database: sqlite3.Connection) -> Iterator[tuple[int, int, int]]:
+    """Time, row id and topic of the rows before the damage, in the order written."""
+    with contextlib.suppress(sqlite3.DatabaseError):
+        for time_ns, row, topic in database.execute("SELECT timestamp, rowid, topic_id FROM messages"):
+            if isinstance(time_ns, int) and isinstance(topic, int):
+                yield time_ns, row, topic
+
+
+def _salvaged(database: sqlite3.Connection, after: _Key, end_ns: int) -> Iterator[_Row]:
+    times, rows = array("q"), array("q")
+    for time_ns, row, _ in _by_row(database):
+        if after < (time_ns, row) and time_ns < end_ns:
+            times.append(time_ns)
+            rows.append(row)
+    for i in np.lexsort((rows, times)).tolist():
+        with contextlib.suppress(sqlite3.DatabaseError):
+            yield from _fetched(database, iter([(times[i], rows[i])]))

@@ -1,0 +1,36 @@
+"""Pieces of a log merged in the order of time; a piece is opened only when its time has come."""
+
+import heapq
+from collections.abc import Callable, Iterable, Iterator
+
+from mcap_landmarks.stage import RawMessage
+
+Piece = tuple[int, Callable[[], Iterable[RawMessage]]]
+_END = 2**64
+
+
+def merge(pieces: Iterable[Piece]) -> Iterator[RawMessage]:
+    """Messages of all pieces by log time; equal times keep the order of the pieces.
+
+    Each piece is the time of its first message, and what opens it; its messages come in order. Only pieces that
+    overlap in time are open together.
+    """
+    active: list[tuple[int, int, RawMessage, Iterator[RawMessage]]] = []
+    for order, (start_ns, open_piece) in enumerate(sorted(pieces, key=lambda piece: piece[0])):
+        yield from _drain(active, start_ns)
+        messages = iter(open_piece())
+        first = next(messages, None)
+        if first is not None:
+            heapq.heappush(active, (first.log_time_ns, order, first, messages))
+    yield from _drain(active, _END)
+
+
+def _drain(active: list[tuple[int, int, RawMessage, Iterator[RawMessage]]], until_ns: int) -> Iterator[RawMessage]:
+    while active and active[0][0] <= until_ns:
+        _, order, message, messages = active[0]
+        yield message
+        following = next(messages, None)
+        if following is None:
+            heapq.heappop(active)
+        else:
+            heapq.heapreplace(active, (following.log_time_ns, order, following, messages))

@@ -1,0 +1,192 @@
+"""ROS 1 messages to ROS 2's CDR: humble's type where the bag's fits into it, else the bag's own definition."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache, partial
+from struct import error as struct_error
+from typing import Any
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.base import TypesysError
+from rosbags.typesys.store import Typestore
+
+from mcap_landmarks.errors import MessageError
+from mcap_landmarks.messages.typestore import definition, typestore
+from mcap_landmarks.sources._shape import Payload
+
+Convert = Callable[[Payload], Payload]
+Description = Any  # a field type of rosbags: (kind, content), nested
+Fields = list[tuple[str, Description]]
+Types = Mapping[str, tuple[Any, Fields]]
+
+_RENAMED = {"tf/msg/tfMessage": "tf2_msgs/msg/TFMessage"}
+_HEADER = "std_msgs/msg/Header"
+_ONE_BYTE = {"byte", "char", "uint8"}
+_FILLER = "structure_needs_at_least_one_member"
+_NUMPY = {"bool": "bool_", "char": "uint8", "byte": "uint8"}
+
+
+@dataclass(frozen=True, slots=True)
+class Converted:
+    """A ROS 1 type in ROS 2: its name, the text of its definition, and how its messages are converted.
+
+    `convert` raises MessageError for bytes that do not fit the bag's definition.
+    """
+
+    message_type: str
+    definition: str
+    convert: Convert
+
+
+@cache
+def converted(ros_type: str, text: str) -> Converted:
+    """How a type of a bag is carried in ROS 2, from its ROS 1 name (`nav_msgs/Odometry`) and definition.
+
+    A humble type takes over if it has every field of the bag's; fields that are new in humble get zeros.
+
+    Raises:
+        MessageError: the definition cannot be understood.
+    """
+    package, _, name = ros_type.partition("/")
+    source_name = f"{package}/msg/{name}"
+    try:
+        source = get_typestore(Stores.EMPTY)
+        source.register(get_types_from_msg(text, source_name))
+        target_name, target = _target(source.fielddefs, source_name)
+    except (TypesysError, KeyError) as error:
+        raise MessageError(f"the definition of {ros_type} cannot be understood: {error}") from error
+    humble = typestore().fielddefs
+    own = target_name not in humble or target.fielddefs[target_name][1] != humble[target_name][1]
+    schema = target.generate_msgdef(target_name, ros_version=2)[0] if own else definition(target_name)
+    if _same_bytes(source.fielddefs, source_name, target.fielddefs, target_name):
+        return Converted(target_name, schema, _guarded(lambda data: target.ros1_to_cdr(data, target_name), ros_type))
+    migrate = _migration(source.fielddefs, source_name, target, target_name)
+
+    def rewrite(data: Payload) -> Payload:
+        return target.serialize_cdr(migrate(source.deserialize_ros1(data, source_name)), target_name)
+
+    return Converted(target_name, schema, _guarded(rewrite, ros_type))
+
+
+def _guarded(convert: Convert, ros_type: str) -> Convert:
+    def guarded(data: Payload) -> Payload:
+        try:
+            return convert(data)
+        except (SerdeError, struct_error, IndexError, ValueError, AssertionError) as error:
+            raise MessageError(f"{len(data)} bytes are not a {ros_type}: {error or type(error).__name__}") from error
+
+    return guarded
+
+
+def _target(source: Types, source_name: str) -> tuple[str, Typestore]:
+    """Name of the type in ROS 2, and a store with it and all that it needs."""
+    humble = typestore().fielddefs
+    needed: dict[str, tuple[Any, Fields]] = {}
+
+    def take(name: str) -> str:
+        new = _RENAMED.get(name, name)
+        if new in humble and _fits(source, name, humble, new):
+            _copy(humble, new, needed)
+        elif name not in needed:
+            needed[name] = source[name]
+            fields = [(field, _renamed(kind, take)) for field, kind in source[name][1]]
+            needed[name] = source[name][0], fields or [(_FILLER, (Nodetype.BASE, ("uint8", 0)))]
+            return name
+        return new
+
+    target_name = take(source_name)
+    target = get_typestore(Stores.EMPTY)
+    target.register(needed)
+    return target_name, target
+
+
+def _copy(types: Types, name: str, into: dict[str, tuple[Any, Fields]]) -> None:
+    if name not in into:
+        into[name] = types[name]
+        for _, kind in types[name][1]:
+            if nested := _nested(kind):
+                _copy(types, nested, into)
+
+
+def _nested(kind: Description) -> str | None:
+    """Name of the message type in a field, None if it holds numbers or text."""
+    inner = kind[1][0] if kind[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE} else kind
+    return str(inner[1]) if inner[0] == Nodetype.NAME else None
+
+
+def _renamed(kind: Description, take: Callable[[str], str]) -> Description:
+    if kind[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE}:
+        return kind[0], (_renamed(kind[1][0], take), kind[1][1])
+    return (kind[0], take(kind[1])) if kind[0] == Nodetype.NAME else kind
+
+
+def _fits(source: Types, source_name: str, target: Types, target_name: str) -> bool:
+    """Whether every field of the source type finds its place in the target type."""
+    places = {name.lower(): kind for name, kind in target[target_name][1]}
+    return all(
+        name.lower() in places and _kind_fits(source, kind, target, places[name.lower()])
+        for name, kind in source[source_name][1]
+        if (source_name, name) != (_HEADER, "seq")
+    )
+
+
+def _kind_fits(source: Types, kind: Description, target: Types, place: Description) -> bool:
+    if kind[0] != place[0]:
+        return False
+    if kind[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE}:
+        return bool(kind[1][1] == place[1][1]) and _kind_fits(source, kind[1][0], target, place[1][0])
+    if kind[0] == Nodetype.NAME:
+        same = bool(_RENAMED.get(kind[1], kind[1]) == place[1])
+        return same and _fits(source, kind[1], target, place[1])
+    return bool(kind[1] == place[1]) or {kind[1][0], place[1][0]} <= _ONE_BYTE
+
+
+def _same_bytes(source: Types, source_name: str, target: Types, target_name: str) -> bool:
+    """Whether the fields follow each other equally, the header's `seq` apart, which CDR leaves out."""
+    have = [(name, kind) for name, kind in source[source_name][1] if (source_name, name) != (_HEADER, "seq")]
+    want = [(name, kind) for name, kind in target[target_name][1] if name != _FILLER]
+    if [name.lower() for name, _ in have] != [name.lower() for name, _ in want]:
+        return False
+    pairs = [(_nested(kind), _nested(place)) for (_, kind), (_, place) in zip(have, want, strict=True)]
+    return all(_same_bytes(source, a, target, b) for a, b in pairs if a and b)
+
+
+def _migration(source: Types, source_name: str, target: Typestore, target_name: str) -> Callable[[object], object]:
+    """What makes an object of the target type from one of the source type."""
+    names = {name.lower(): (name, kind) for name, kind in source[source_name][1]}
+    steps: list[Callable[[object], object]] = []
+    for name, place in target.fielddefs[target_name][1]:
+        if name.lower() in names:
+            steps.append(_field_migration(source, names[name.lower()], target, place))
+        else:
+            steps.append(partial(_default, target, place))
+    make: Callable[..., object] = target.types[target_name]
+    return lambda message: make(*[step(message) for step in steps])
+
+
+def _field_migration(
+    source: Types, field: tuple[str, Description], target: Typestore, place: Description
+) -> Callable[[object], object]:
+    name, kind = field
+    nested, wanted = _nested(kind), _nested(place)
+    if nested is None or wanted is None:
+        return lambda message: getattr(message, name)
+    migrate = _migration(source, nested, target, wanted)
+    if kind[0] == Nodetype.NAME:
+        return lambda message: migrate(getattr(message, name))
+    return lambda message: [migrate(item) for item in getattr(message, name)]
+
+
+def _default(target: Typestore, place: Description, _message: object = None) -> object:
+    kind, content = place
+    if kind == Nodetype.BASE:
+        return "" if content[0] == "string" else 0
+    if kind == Nodetype.NAME:
+        return target.types[content](*[_default(target, inner) for _, inner in target.fielddefs[content][1]])  # type: ignore[arg-type]
+    inner, size = content[0], content[1] if kind == Nodetype.ARRAY else 0
+    if inner[0] == Nodetype.BASE and inner[1][0] != "string":
+        return np.zeros(size, dtype=_NUMPY.get(inner[1][0], inner[1][0]))
+    return [_default(target, inner) for _ in range(size)]

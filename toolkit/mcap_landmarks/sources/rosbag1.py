@@ -1,0 +1,161 @@
+"""ROS 1 bags: every message becomes ROS 2 CDR, in the order of the time at which it was recorded."""
+
+import contextlib
+from collections import Counter
+from collections.abc import Collection, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+from mcap_landmarks.errors import MessageError, RecordingError
+from mcap_landmarks.messages.qos import KEY, qos_profile
+from mcap_landmarks.sources._bag_container import MAGIC, BagConnection, BagMessage, ChunkInfo, DamagedBagError
+from mcap_landmarks.sources._bag_index import BagIndex, read_chunk, read_index
+from mcap_landmarks.sources._merge import merge
+from mcap_landmarks.sources._ros1_types import Convert, converted
+from mcap_landmarks.sources._shape import NoConfig, Source, SourceLog
+from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
+
+
+def recognises(path: Path) -> bool:
+    """A file named .bag, or one that begins as bags do."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        return path.suffix == ".bag" or stream.read(8) == MAGIC[:8]
+
+
+@contextlib.contextmanager
+def open_bag(path: Path, _config: NoConfig) -> Iterator[Sequence[SourceLog]]:
+    """The one log of a bag.
+
+    Raises:
+        RecordingError: it is no bag of format 2.0, is encrypted, or has a type that cannot be understood.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        start = stream.read(len(MAGIC))
+        if not start:
+            raise RecordingError(f"{path} is empty (0 bytes); record or copy it again")
+        if start != MAGIC:
+            remedy = "bring it to format 2.0 with `rosbag migrate`" if start[:8] == MAGIC[:8] else "check the file"
+            raise RecordingError(f"{path} is not a ROS 1 bag of format 2.0; {remedy}")
+        try:
+            index = read_index(stream, size)
+        except DamagedBagError as error:
+            raise RecordingError(f"{path} cannot be read: {error}; copy or decrypt it again") from error
+    yield [SourceLog(path.stem, (BagLog(path, size, index),), size)]
+
+
+class BagLog:
+    """The log in a bag. Connections that differ only in their publisher share one channel."""
+
+    def __init__(self, path: Path, size: int, index: BagIndex) -> None:
+        self.losses = [f"{path.name}: {loss}" for loss in index.losses]
+        self._path, self._size, self._chunks = path, size, [chunk for chunk in index.chunks if chunk.counts]
+        self._connections: dict[int, Connection] = {}
+        self._convert: dict[Connection, Convert | MessageError] = {}
+        shared: dict[BagConnection, Connection] = {}
+        for key, described in sorted(index.connections.items()):
+            if described not in shared:
+                shared[described], convert = _carried(described)
+                self._convert[shared[described]] = convert
+            self._connections[key] = shared[described]
+        counts: Counter[Connection] = Counter()
+        for key, count in index.counts().items():
+            if key in self._connections:  # the others are told of when they are read
+                counts[self._connections[key]] += count
+        self.channels = [ChannelSummary(connection, counts[connection]) for connection in shared.values()]
+        self.start_ns = min((chunk.start_ns for chunk in self._chunks), default=None)
+        self.end_ns = max((chunk.end_ns for chunk in self._chunks), default=None)
+        self._misfits: Counter[Connection] = Counter()
+
+    def messages(
+        self,
+        connections: Collection[Connection] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+        progress: Progress | None = None,
+    ) -> Iterator[RawMessage]:
+        """See `Log`; a message that does not fit its definition is left out and told in `losses`.
+
+        Raises:
+            RecordingError: the definition of a wanted type cannot be understood.
+        """
+        wanted = {key: c for key, c in self._connections.items() if connections is None or c in connections}
+        carried = {key: (connection, self._conversion(connection)) for key, connection in wanted.items()}
+        first, last = start_ns or 0, 2**64 if end_ns is None else end_ns
+        chunks = [chunk for chunk in self._chunks if chunk.end_ns >= first and chunk.start_ns < last]
+        return merge(
+            (max(chunk.start_ns, first), partial(self._load, chunk, carried, (first, last), progress))
+            for chunk in chunks
+        )
+
+    def _load(
+        self,
+        chunk: ChunkInfo,
+        carried: dict[int, tuple[Connection, Convert]],
+        within_ns: tuple[int, int],
+        progress: Progress | None,
+    ) -> list[RawMessage]:
+        """Messages of a chunk, converted."""
+        messages = []
+        first, last = within_ns
+        for time_ns, key, data in self._checked(chunk, progress):
+            if key in carried and first <= time_ns < last:
+                connection, convert = carried[key]
+                try:
+                    messages.append(RawMessage(connection, time_ns, time_ns, 0, convert(data)))
+                except MessageError as error:
+                    self._misfit(connection, error)
+        return messages
+
+    def _checked(self, chunk: ChunkInfo, progress: Progress | None) -> list[BagMessage]:
+        """Messages of a chunk; what it lacks is told."""
+        with self._path.open("rb") as stream:
+            found, _, problem = read_chunk(stream, self._size, chunk.offset)
+            if progress:
+                progress(stream.tell() - chunk.offset)
+        missing = sum(chunk.counts.values()) - len(found)
+        where = f"the chunk at byte {chunk.offset}"
+        if missing > 0:
+            why = f" ({problem})" if problem else ""
+            self._lose(f"{where}{why} lacks {missing} of {sum(chunk.counts.values())} messages")
+        elif problem:
+            self._lose(f"{where} is damaged ({problem}); the {len(found)} messages before that were taken")
+        orphans = sum(message.connection_id not in self._connections for message in found)
+        if orphans:
+            self._lose(f"{orphans} messages of {where} belong to no connection")
+        return found
+
+    def _conversion(self, connection: Connection) -> Convert:
+        convert = self._convert[connection]
+        if isinstance(convert, MessageError):
+            remedy = "leave the topic out with --topics"
+            raise RecordingError(f"{self._path}: topic {connection.topic}: {convert}; {remedy}") from convert
+        return convert
+
+    def _lose(self, text: str) -> None:
+        text = f"{self._path.name}: {text}"
+        if text not in self.losses:
+            self.losses.append(text)
+
+    def _misfit(self, connection: Connection, error: MessageError) -> None:
+        """Tell of the first message of a topic that does not fit; the counts tell of the others."""
+        self._misfits[connection] += 1
+        if self._misfits[connection] == 1:
+            self._lose(f"{connection.topic}: {error}; such messages are left out")
+
+
+def _carried(described: BagConnection) -> tuple[Connection, Convert | MessageError]:
+    """The ROS 2 connection that stands for one of the bag, and what converts its messages or why nothing can."""
+    slash = "/" if described.topic.startswith("/") else ""
+    topic = slash + "/".join(part for part in described.topic.split("/") if part)
+    metadata = {KEY: qos_profile(latched=described.latched)}
+    try:
+        type_ = converted(described.ros_type, described.definition)
+    except MessageError as error:
+        return Connection(topic, described.ros_type.replace("/", "/msg/"), b"", metadata=metadata), error
+    return Connection(topic, type_.message_type, type_.definition.encode(), metadata=metadata), type_.convert
+
+
+SOURCE = Source("rosbag1", "ROS 1 bags (.bag)", NoConfig, recognises, open_bag)

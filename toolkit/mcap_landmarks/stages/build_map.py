@@ -1,0 +1,104 @@
+"""Build a landmark map from scene objects and odometry of one or several logs."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from mcap_landmarks.channels import MAP_MARKERS, MAP_PATH, MAP_POSE, ODOMETRY, SCENE_OBJECTS
+from mcap_landmarks.errors import MapError
+from mcap_landmarks.mapping.landmark_slam import solve_jointly
+from mcap_landmarks.mapping.observations import LogObservations, Trajectory
+from mcap_landmarks.mapping.thesis import solve_as_in_the_thesis
+from mcap_landmarks.maps.model import LandmarkMap
+from mcap_landmarks.maps.scene_objects import known_covariances
+from mcap_landmarks.stage import Bundle, Reduction, Tolerance
+
+
+@dataclass(frozen=True, slots=True)
+class BuildMapConfig:
+    """How a map is built.
+
+    `range_sigma_m` and `bearing_sigma_rad` stand in for covariances that the log leaves unknown. Odometry noise per
+    square root of a metre (`odometry_position_m`, `odometry_heading_rad`) or of a radian (`odometry_turning_rad`) is a
+    first guess; the log itself tells the rest. `slack` widens the observations' sigmas while they are labelled.
+    `robust_dof`: degrees of the Student-t distribution of the joint solution. A landmark with fewer fitting sightings
+    than `min_sightings` is tentative, and so is one that stands where another does and was seen less than
+    `misread_share` times as often: it is that one under a wrong class. Logs join if their landmarks agree within
+    `join_tolerance_m`.
+    """
+
+    method: Literal["default", "thesis"] = "default"
+    range_sigma_m: float = 0.05
+    bearing_sigma_rad: float = 0.01
+    odometry_position_m: float = 0.05
+    odometry_heading_rad: float = 0.05
+    odometry_turning_rad: float = 0.1
+    slack: float = 1.7
+    robust_dof: float = 1.0
+    min_sightings: int = 3
+    misread_share: float = 0.1
+    join_tolerance_m: float = 0.6
+
+
+def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservations:
+    """What one log saw: its bundles that have odometry, and their objects."""
+    count = 0
+    kept: list[Bundle] = []
+    scenes = []
+    for bundle in bundles:
+        scene = bundle.get(SCENE_OBJECTS)
+        count += 1
+        if scene is not None and bundle.odometry is not None and (not kept or bundle.stamp_ns > kept[-1].stamp_ns):
+            kept.append(bundle)
+            scenes.append(scene)
+    trail = [bundle.odometry for bundle in kept if bundle.odometry is not None]
+    sizes = [len(scene) for scene in scenes]
+    spread = [known_covariances(scene, config.range_sigma_m, config.bearing_sigma_rad) for scene in scenes]
+    return LogObservations(
+        np.array([bundle.stamp_ns for bundle in kept], dtype=np.int64),
+        np.array([bundle.log_time_ns for bundle in kept], dtype=np.int64),
+        np.array([at.odom_from_base for at in trail]).reshape(-1, 3),
+        np.array([at.way_m for at in trail]),
+        np.array([at.turned_rad for at in trail]),
+        np.repeat(np.arange(len(kept)), sizes),
+        tuple(name for scene in scenes for name in scene.classes),
+        np.concatenate([np.zeros((0, 2)), *(scene.positions_xy for scene in scenes)]),
+        np.concatenate([np.zeros((0, 2, 2)), *spread]),
+        np.concatenate([np.zeros(0), *(scene.radii_m for scene in scenes)]),
+        count,
+    )
+
+
+def solve(
+    logs: Sequence[LogObservations], prior: LandmarkMap | None, config: BuildMapConfig
+) -> tuple[LandmarkMap, list[Trajectory]]:
+    """One map of all logs, and each log's trajectory in it.
+
+    Raises:
+        MapError: nothing was seen, or a log cannot be joined to the others.
+    """
+    if not any(len(log.bundle) for log in logs):
+        raise MapError("no bundle holds an object; a map needs scene objects")
+    if config.method == "thesis":
+        return solve_as_in_the_thesis(logs)
+    return solve_jointly(logs, prior, config)
+
+
+STAGE = Reduction(
+    "build_map",
+    reads=(SCENE_OBJECTS, ODOMETRY),
+    writes=(MAP_MARKERS, MAP_PATH, MAP_POSE),
+    config=BuildMapConfig,
+    collect=collect,
+    solve=solve,
+    tolerance={
+        "position_m": 1e-4,
+        "orientation": 1e-5,
+        "size_m": 1e-4,
+        "radius_m": 1e-4,
+        "heading_rad": 1e-5,
+        "covariance": Tolerance(1e-9, 1e-3),
+    },
+)

@@ -1,0 +1,164 @@
+"""Localize every bundle of scene objects in a landmark map."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from mcap_landmarks.channels import (
+    MAP,
+    MATCH,
+    ODOMETRY,
+    POSE,
+    POSE_COVARIANCE,
+    SCENE_OBJECTS,
+    TF,
+)
+from mcap_landmarks.errors import MapError
+from mcap_landmarks.geometry.frames import plain
+from mcap_landmarks.geometry.se2 import compose, inverse
+from mcap_landmarks.localization.class_association import unique_classes
+from mcap_landmarks.localization.decision import Match
+from mcap_landmarks.localization.repeated_classes import JoinedLocator
+from mcap_landmarks.localization.thesis import locate_as_in_the_thesis
+from mcap_landmarks.localization.unique_classes import UniqueLocator
+from mcap_landmarks.localization.validation import check_map
+from mcap_landmarks.maps.database import read_map, read_neighbours
+from mcap_landmarks.maps.map_message import scene_from_map
+from mcap_landmarks.maps.model import LandmarkMap
+from mcap_landmarks.messages.match import Status
+from mcap_landmarks.messages.poses import PoseStamped, PoseWithCovarianceStamped
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.stage import Bundle, OdometryAt, Omission, Stage, Stamped, Tolerance
+
+# Bundles that are solved together, or calibrated from; what follows the robot takes them one by one.
+_BATCH, _FOLLOWED = 4096, 64
+_NO_FRAME = "transforms from the map to odometry that were not written, as odometry names no frame of its own"
+
+Locate = Callable[[Sequence[SceneObjects], Sequence[OdometryAt | None]], list[Match]]
+
+
+@dataclass(frozen=True, slots=True)
+class LocalizeConfig:
+    """How bundles are localized.
+
+    `max_sigma_m`: a pose whose own position sigma (square root of the largest eigenvalue) is above it is refused, and
+    so is one whose heading sigma is above `max_sigma_deg`: three of them are the 20 degrees that make a pose false.
+    `range_sigma_m` and `bearing_sigma_rad` stand in for covariances that the log leaves unknown.
+
+    Where every class stands for one landmark: `robust_dof`, degrees of the Student-t distribution that observations
+    weigh by (0 weighs them by their covariance alone); `consistency`, the probability under which a set of objects that
+    do fit is refused; `calibrate` finds from the first bundles whether ranges are distances or depths, and their
+    offset, and corrects them where that explains far more than chance. Objects whose covariance leaves the bearing open
+    (a sigma beyond a radian) or the range (beyond the range itself) count by what is left, three of them or more.
+
+    Where classes repeat: `accidental`, the most accidental matches to expect of a match that is accepted; `join_m`,
+    over how many metres bundles are matched together (0: each alone), through odometry whose noise per square root of
+    a metre or radian is `odometry_position_m`, `odometry_heading_rad` and `odometry_turning_rad`.
+
+    `tf`: write map -> odom, or never. `thesis_guess_m`: the fixed initial guess of the thesis's solver, which the
+    thesis does not print.
+    """
+
+    method: Literal["default", "thesis"] = "default"
+    max_sigma_m: float = 0.5
+    max_sigma_deg: float = 6.5
+    range_sigma_m: float = 0.05
+    bearing_sigma_rad: float = 0.01
+    robust_dof: float = 0.0
+    consistency: float = 1e-3
+    calibrate: bool = True
+    accidental: float = 2e-3
+    join_m: float = 30.0
+    odometry_position_m: float = 0.05
+    odometry_heading_rad: float = 0.05
+    odometry_turning_rad: float = 0.1
+    tf: Literal["auto", "never"] = "auto"
+    thesis_guess_m: tuple[float, float] = (0.0, 0.0)
+
+
+def process(
+    bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Path]
+) -> Iterator[Stamped | Omission]:
+    """Match and pose of every bundle, the map once before the first; a transform that cannot be is an omission."""
+    landmark_map = _usable_map(resources["map"])
+    locate, size = _method(resources["map"], landmark_map, config)
+    stream, first = iter(bundles), True
+    while batch := list(islice(stream, size)):
+        if first:
+            yield Stamped(MAP, batch[0].log_time_ns, scene_from_map(landmark_map, batch[0].stamp_ns))
+            first = False
+        scenes = [scene for bundle in batch if (scene := bundle.get(SCENE_OBJECTS)) is not None]
+        for bundle, match in zip(batch, locate(scenes, [bundle.odometry for bundle in batch]), strict=True):
+            yield from _messages(bundle, match, landmark_map.frame, config)
+
+
+def _usable_map(path: Path) -> LandmarkMap:
+    """The map in a database, if a pose can be found in it.
+
+    Raises:
+        MapError: it cannot be read, or no pose can be found in it.
+    """
+    landmark_map = read_map(path)
+    try:
+        check_map(landmark_map)
+    except MapError as error:
+        raise MapError(f"{path}: {error}") from error
+    return landmark_map
+
+
+def _method(path: Path, landmark_map: LandmarkMap, config: LocalizeConfig) -> tuple[Locate, int]:
+    """The way to localize that the configuration and the map's classes ask for, and how many bundles at once."""
+    if config.method == "thesis":
+        return lambda scenes, _odometry: locate_as_in_the_thesis(scenes, landmark_map, config), _BATCH
+    if len(unique_classes(landmark_map)) == np.count_nonzero(~landmark_map.tentative):
+        unique = UniqueLocator(landmark_map, config)
+        return lambda scenes, _odometry: unique.locate(scenes), _BATCH
+    joined = JoinedLocator(landmark_map, read_neighbours(path, landmark_map), config)
+    return joined.locate, _FOLLOWED if config.join_m > 0 else _BATCH
+
+
+def _messages(bundle: Bundle, match: Match, frame: str, config: LocalizeConfig) -> Iterator[Stamped | Omission]:
+    yield Stamped(MATCH, bundle.log_time_ns, match.message)
+    if match.message.status != Status.LOCALIZED or match.pose is None:
+        return
+    pose, stamp_ns = match.pose, bundle.stamp_ns
+    if match.covariance is None:  # no heading is known, and an all-zero quaternion says so
+        position = np.array([pose[0], pose[1], 0.0])
+        yield Stamped(POSE, bundle.log_time_ns, PoseStamped(stamp_ns, frame, position, np.zeros(4)))
+        return
+    yield Stamped(POSE, bundle.log_time_ns, PoseStamped.planar(stamp_ns, frame, pose))
+    message = PoseWithCovarianceStamped.planar(stamp_ns, frame, pose, match.covariance)
+    yield Stamped(POSE_COVARIANCE, bundle.log_time_ns, message)
+    if config.tf == "auto" and bundle.odometry is not None:
+        if plain(bundle.odometry.frame_id) in ("", plain(frame)):  # readers refuse transforms from a frame to itself
+            yield Omission(bundle.log_time_ns, _NO_FRAME)
+            return
+        map_from_odom = compose(pose, inverse(bundle.odometry.odom_from_base))
+        transform = Transform.planar(stamp_ns, (frame, bundle.odometry.frame_id), map_from_odom)
+        yield Stamped(TF, bundle.log_time_ns, TFMessage((transform,)))
+
+
+STAGE = Stage(
+    "localize",
+    reads=(SCENE_OBJECTS, ODOMETRY),
+    writes=(MAP, MATCH, POSE, POSE_COVARIANCE, TF),
+    config=LocalizeConfig,
+    process=process,
+    resources=("map",),
+    tolerance={
+        "position_m": 1e-6,
+        "orientation": 1e-7,
+        "translation_m": 1e-4,
+        "rotation": 1e-7,
+        "covariance": Tolerance(1e-12, 1e-6),
+        "residual_m": 1e-6,
+        "candidate_scores": Tolerance(1e-6, 1e-6),
+        "expected_accidental": Tolerance(1e-12, 1e-4),
+        "chi2": Tolerance(1e-6, 1e-6),
+    },
+)
