@@ -9,14 +9,14 @@ from mcap_landmarks.estimation.thesis import solve_position
 from mcap_landmarks.geometry.se2 import Array, inverse, transform_points
 from mcap_landmarks.lidar import shapes
 from mcap_landmarks.lidar.beams import sweep
+from mcap_landmarks.lidar.clustering import cluster, shapes_of
+from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.objects import Hypotheses
 from mcap_landmarks.localization.index import MapIndex
 from mcap_landmarks.localization.matching import MatchConfig, Matcher
 from mcap_landmarks.maps.exchange_thesis import parse_map, parse_results
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.messages.scene import SceneObjects
-from mcap_landmarks.stages._cluster_config import ClusterConfig
-from mcap_landmarks.stages.cluster import cluster, shapes_of
 from numpy.typing import NDArray
 
 from tests.benchmark.rows import Row

@@ -8,9 +8,9 @@ from mcap_landmarks.geometry.angles import quaternion_from_yaw
 from mcap_landmarks.geometry.se2 import Array, inverse, transform_points
 from mcap_landmarks.lidar import thesis
 from mcap_landmarks.lidar.beams import echoes, sweep
+from mcap_landmarks.lidar.clustering import cluster, shapes_of
+from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.objects import Hypotheses
-from mcap_landmarks.stages._cluster_config import ClusterConfig
-from mcap_landmarks.stages.cluster import cluster, shapes_of
 from mcap_landmarks_generator.assets import catalog
 from mcap_landmarks_generator.history import History
 from mcap_landmarks_generator.layout import PlacedObject

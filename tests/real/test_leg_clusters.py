@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.lidar.beams import echoes, sweep
+from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.segments import Breaks, extent_m, near_clusters, points_of, segments
-from mcap_landmarks.stages._cluster_config import ClusterConfig
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_typestore
 from scipy.optimize import linear_sum_assignment

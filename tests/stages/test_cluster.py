@@ -11,6 +11,7 @@ from mcap_landmarks.channels import ODOMETRY, SCAN, SCAN_FILTERED, SCAN_OBJECTS,
 from mcap_landmarks.config import stage_config
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.geometry.se2 import Array, compose, exp, transform_points
+from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.messages.codec import Message, decode, encode
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.poses import Odometry
@@ -19,7 +20,6 @@ from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.recording.association import Association, associate
 from mcap_landmarks.stage import Bundle, Omission
-from mcap_landmarks.stages._cluster_config import ClusterConfig
 from mcap_landmarks.stages.cluster import process
 
 from tests.lidar.scans import ANGLES_RAD, Thing, box, disc, ranges

@@ -10,7 +10,7 @@ from typing import Any, Generic, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.geometry.se2 import Array, between, exp, interpolate
 from mcap_landmarks.messages.codec import M, Message
 
 
@@ -107,6 +107,18 @@ class OdometryAt:
     turned_rad: float
     velocity: Array = field(default_factory=lambda: np.zeros(3))
     steps: Steps | None = None
+
+    def base_from_then(self, stamp_ns: int, times_ns: NDArray[np.int64]) -> Array:
+        """Where the base was at some times (N,), as poses (N, 3) in the base frame at `stamp_ns`.
+
+        Beyond what the log tells the base keeps its velocity, or stays where it was last.
+        """
+        steps = self.steps
+        if steps is None or not (len(steps.stamps_ns) > 1 and steps.stamps_ns[0] <= times_ns.min()):
+            return exp((times_ns - stamp_ns)[:, None] / 1e9 * self.velocity)
+        # What the log does not tell any more is little: a bundle waits until odometry has passed its last beam.
+        known = np.minimum(times_ns, steps.stamps_ns[-1])
+        return between(self.odom_from_base, interpolate(steps.stamps_ns, steps.odom_from_base, known))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.fusion.sizes import Size
+from mcap_landmarks.classes import Size
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.camera import CameraModel

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from mcap_landmarks.classes import ANY_SIZE, Size
 from mcap_landmarks.fusion.box_geometry import BoxError, Sights, View, misfits, sights_of
 from mcap_landmarks.fusion.centres import Centres, centres_of, fits_of, radii_in_boxes
 from mcap_landmarks.fusion.class_belief import Belief, Weighing
-from mcap_landmarks.fusion.sizes import ANY_SIZE, Size
 from mcap_landmarks.fusion.track_history import Past, is_redundant, shown
 from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array, transform_points

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mcap_landmarks.classes import Size
 from mcap_landmarks.fusion.box_geometry import Sights, View
-from mcap_landmarks.fusion.sizes import Size
 from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array, compose, transform_points
 

@@ -1,12 +1,39 @@
 """Algorithm 2 of the thesis: what of a scan lies in the camera's view, and the middle beam of each object."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.lidar.beams import echoes
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scan_objects import ScanObjects
 
 VIEW_DEG = 30.0
 RANGE_M = (0.5, 15.0)
+
+
+def scan_objects(scan: LaserScan, stamp_ns: int, base: str, base_from_lidar: Array) -> tuple[LaserScan, ScanObjects]:
+    """The filtered scan, and the near surface at every object's middle beam; nobody knows what it is or how exactly.
+
+    `base_from_lidar` (4, 4) leads to the frame `base`, in which the objects are.
+    """
+    filtered = filter_view(echoes(scan.ranges_m, scan.range_min_m, scan.range_max_m))
+    beams = middle_beams(binary(filtered))
+    local = places(filtered, beams)
+    points = frames.apply(base_from_lidar, np.column_stack([local, np.zeros(len(local))]))[:, :2]
+    found = ScanObjects(
+        stamp_ns,
+        base,
+        tuple(str(beam) for beam in beams.tolist()),
+        ((("", 1.0),),) * len(beams),
+        tuple(point[None] for point in points),
+        (np.zeros((1, 2, 2)),) * len(beams),
+        np.zeros(len(beams)),
+    )
+    return replace(scan, ranges_m=filtered.astype(np.float32), intensities=np.zeros(0, np.float32)), found
 
 
 def degrees(count: int) -> Array:

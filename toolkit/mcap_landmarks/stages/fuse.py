@@ -18,12 +18,12 @@ from mcap_landmarks.channels import (
     SCENE_OBJECTS,
     TF_STATIC,
 )
+from mcap_landmarks.classes import CLASSES, Size
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.fusion.box_geometry import BoxError, View
 from mcap_landmarks.fusion.class_belief import Weighing
 from mcap_landmarks.fusion.fuser import Fuser, Rules
 from mcap_landmarks.fusion.markers import markers_from_scene
-from mcap_landmarks.fusion.sizes import SIZES, Size
 from mcap_landmarks.fusion.thesis import fuse_in_order
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.messages.detections import Detections
@@ -122,7 +122,7 @@ def process(
 def _rules(config: FuseConfig) -> Rules:
     bearing_rad = float(np.deg2rad(config.bearing_sigma_deg))
     return Rules(
-        sizes={**SIZES, **config.sizes},
+        sizes={**{name: known.size for name, known in CLASSES.items()}, **config.sizes},
         error=BoxError(config.edge_px, config.edge_share, bearing_rad, config.lateral_m),
         weighing=_weighing(config),
         bearing_gate=config.bearing_gate,

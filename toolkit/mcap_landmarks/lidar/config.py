@@ -1,0 +1,63 @@
+"""How scans are clustered: the one configuration of what this package does."""
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field
+
+from mcap_landmarks.classes import CLASSES, Positive, Section
+
+Share = Annotated[float, Field(gt=0, lt=1)]
+
+
+def _rising(span: tuple[float, float]) -> tuple[float, float]:
+    if not span[0] < span[1]:
+        raise ValueError("nothing is between these; give the lower number first")
+    return span
+
+
+Rising = Annotated[tuple[float, float], AfterValidator(_rising)]
+Sections = dict[str, tuple[Annotated[Section, Discriminator("kind")], ...]]
+
+
+def _sections() -> Sections:
+    return {name: known.sections for name, known in CLASSES.items()}
+
+
+def _over_known(given: object) -> object:
+    return {**_sections(), **given} if isinstance(given, dict) else given
+
+
+@dataclass(frozen=True, slots=True)
+class ClusterConfig:
+    """How scans become objects.
+
+    `shapes`: the cross-sections of classes at the LiDAR's height, each a list of tables with a `kind` (disc, legs, box,
+    parts); classes that are not named keep theirs, an empty list takes one out. `sigma_m`: noise of a range; `dropout`:
+    share of beams that return nothing from an object; `stray`: share of hits that are something else's.
+    `incidence_deg`: no surface is met at a smaller angle, so that neighbouring hits farther apart are of two; `link_m`:
+    hits of one piece are no farther apart, and pieces no farther apart than `near_m` are one. What is larger than
+    `largest_m` is background; unset, what is larger than every shape. `range_m` and `view_deg` limit what is looked at:
+    distances from the LiDAR, bearings in the base frame, counter-clockwise from, to; unset, all that the scan gives.
+    `gate_m`: how far an object may be from where it was last, through odometry, and keep its id, which is kept for
+    `memory_s` without being seen. Of a point cloud the points between the heights `slice_m` in the base frame count,
+    the nearest one in every `slice_beam_deg`, or as finely as the cloud goes if that is coarser.
+
+    The thesis (Algorithm 2) has 0 to 30 and 330 to 360 degrees, 0.5 to 15 m, and the middle beam of every run of hits.
+    """
+
+    method: Literal["default", "thesis"] = "default"
+    shapes: Annotated[Sections, BeforeValidator(_over_known)] = field(default_factory=_sections)
+    sigma_m: Positive = 0.01
+    dropout: Share = 0.01
+    stray: Share = 0.01
+    incidence_deg: Annotated[float, Field(gt=0, lt=90)] = 10.0
+    link_m: Positive = 0.3
+    near_m: Positive = 0.13
+    largest_m: Positive | None = None
+    range_m: Rising | None = None
+    view_deg: tuple[float, float] | None = None
+    gate_m: Positive = 0.5
+    memory_s: Positive = 10.0
+    slice_m: Rising | None = None
+    slice_beam_deg: Annotated[float, Field(gt=0, le=10)] = 0.5

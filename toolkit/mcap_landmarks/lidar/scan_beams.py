@@ -1,0 +1,88 @@
+"""Scan messages and point clouds as beams in the base frame, each at the time it was measured."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.errors import UsageError
+from mcap_landmarks.geometry import frames
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.lidar.beams import Beams, Limits, echoes, sweep
+from mcap_landmarks.lidar.clouds import in_slice, slice_beams
+from mcap_landmarks.lidar.config import ClusterConfig
+from mcap_landmarks.messages.points import PointCloud2
+from mcap_landmarks.messages.scan import LaserScan
+
+BaseFromThen = Callable[[NDArray[np.int64]], Array]
+"""Poses (N, 3) of the base at times (N,) in ns, in the base frame at the moment that is asked for."""
+
+
+def beams_of(
+    message: LaserScan | PointCloud2,
+    stamp_ns: int,
+    base_from_lidar: Array,
+    base_from_then: BaseFromThen | None,
+    config: ClusterConfig,
+) -> Beams | None:
+    """The beams of one LiDAR mounted at `base_from_lidar` (4, 4), None if they have no known directions.
+
+    `stamp_ns` stands in where the message has no stamp. Without `base_from_then` the base stood still meanwhile.
+
+    Raises:
+        UsageError: there is a point cloud, and no heights to cut it at.
+    """
+    if isinstance(message, PointCloud2):
+        return _slice(message, stamp_ns, base_from_lidar, base_from_then, config)
+    if not _makes_sense(message):
+        return None
+    places = np.arange(len(message.ranges_m), dtype=np.float64)
+    return sweep(
+        message.angle_min_rad + places * message.angle_increment_rad,
+        echoes(message.ranges_m, message.range_min_m, message.range_max_m),
+        base_from_lidar,
+        None if base_from_then is None else base_from_then(_times_ns(message, stamp_ns)),
+        _limits(config),
+    )
+
+
+def _makes_sense(scan: LaserScan) -> bool:
+    """Whether a scan has beams in known directions."""
+    return (
+        bool(np.isfinite([scan.angle_min_rad, scan.angle_increment_rad]).all())
+        and scan.angle_increment_rad != 0
+        and len(scan.ranges_m) > 1
+    )
+
+
+def _limits(config: ClusterConfig) -> Limits:
+    if config.view_deg is None:
+        return Limits(config.range_m or (0.0, np.inf))
+    low, high = config.view_deg
+    across = high - low if high > low else (high - low) % 360.0  # 330 to 30 is what -30 to 30 is
+    return Limits(config.range_m or (0.0, np.inf), (math.radians(low), math.radians(low + across)))
+
+
+def _times_ns(scan: LaserScan, stamp_ns: int) -> NDArray[np.int64]:
+    """When each beam (N,) was; all at once where the scan does not say."""
+    first_ns = scan.stamp_ns or stamp_ns - scan.duration_ns  # without a stamp the log time counts, of a whole turn
+    count = len(scan.ranges_m)
+    return first_ns + np.arange(count, dtype=np.int64) * scan.duration_ns // max(count - 1, 1)
+
+
+def _slice(
+    cloud: PointCloud2,
+    stamp_ns: int,
+    base_from_lidar: Array,
+    base_from_then: BaseFromThen | None,
+    config: ClusterConfig,
+) -> Beams:
+    if config.slice_m is None:
+        raise UsageError("a point cloud is cut between two heights above the base frame: give --slice ZMIN:ZMAX in m")
+    points = frames.apply(base_from_lidar, cloud.points_m)
+    inside, moved = in_slice(points, config.slice_m), None
+    if base_from_then is not None and cloud.times_ns is not None and inside.any():
+        moved = base_from_then((cloud.stamp_ns or stamp_ns) + cloud.times_ns[inside])
+    beam_rad = np.deg2rad(config.slice_beam_deg)
+    return slice_beams(points[inside, :2], base_from_lidar[:2, 3], beam_rad, moved, _limits(config))
