@@ -76,7 +76,7 @@ def start_pose(scenario: Scenario) -> Floats:
 def _check_variants(loaded: LoadedScenario) -> None:
     for i, spec in enumerate(loaded.scenario.objects):
         try:
-            built(spec.kind, spec.variant, spec.look)
+            built(spec.class_name, spec.variant, spec.look)
         except ToolkitError as error:
             raise loaded.fault(("objects", i, "variant"), str(error)) from error
 

@@ -42,7 +42,7 @@ def _group(
             places.append(place)
     return [
         ObjectSpec(
-            kind=spec.classes[rng.integers(len(spec.classes))],
+            class_name=spec.classes[rng.integers(len(spec.classes))],
             at=(round(float(x), 3), round(float(y), 3)),
             yaw_deg=round(float(np.rad2deg(towards_way_rad) + rng.uniform(-60, 60)), 1),
             look=int(rng.integers(spec.looks)),

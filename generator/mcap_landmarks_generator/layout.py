@@ -55,11 +55,11 @@ def place(specs: tuple[ObjectSpec, ...]) -> tuple[PlacedObject, ...]:
     counts: dict[str, int] = {}
     placed = []
     for spec in specs:
-        counts[spec.kind] = counts.get(spec.kind, 0) + 1
+        counts[spec.class_name] = counts.get(spec.class_name, 0) + 1
         placed.append(
             PlacedObject(
-                f"{spec.kind.replace(' ', '_')}_{counts[spec.kind]}",
-                built(spec.kind, spec.variant, spec.look),
+                f"{spec.class_name.replace(' ', '_')}_{counts[spec.class_name]}",
+                built(spec.class_name, spec.variant, spec.look),
                 np.array([spec.at, *spec.walk], dtype=np.float64),
                 float(np.deg2rad(spec.yaw_deg)),
                 spec.speed_mps,

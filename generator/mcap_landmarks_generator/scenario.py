@@ -36,7 +36,7 @@ def _among(names: tuple[str, ...]) -> Callable[[str], str]:
 
 
 _OBJECTS = catalog.CLASSES + catalog.DISTRACTORS
-Kind = Annotated[str, AfterValidator(_among(_OBJECTS)), Field(json_schema_extra={"enum": list(_OBJECTS)})]
+ClassName = Annotated[str, AfterValidator(_among(_OBJECTS)), Field(json_schema_extra={"enum": list(_OBJECTS)})]
 Ground = Annotated[str, AfterValidator(_among(ground.KINDS)), Field(json_schema_extra={"enum": list(ground.KINDS)})]
 Sky = Annotated[str, AfterValidator(_among(sky.KINDS)), Field(json_schema_extra={"enum": list(sky.KINDS)})]
 
@@ -47,7 +47,7 @@ class ObjectSpec:
 
     __pydantic_config__: ClassVar[ConfigDict] = CONFIG
 
-    kind: Annotated[Kind, Field(alias="class")]
+    class_name: Annotated[ClassName, Field(alias="class")]
     """Class or distractor, as the generator's catalog names it."""
     at: Point
     """Where the centre of its section at LiDAR height stands, in metres of the frame map."""
@@ -73,7 +73,7 @@ class GroupsSpec:
     """How many groups."""
     size: Annotated[int, Field(ge=1, le=8)] = 3
     """Objects per group."""
-    classes: Annotated[tuple[Kind, ...], Field(min_length=1)] = ("fire hydrant", "person", "suitcase")
+    classes: Annotated[tuple[ClassName, ...], Field(min_length=1)] = ("fire hydrant", "person", "suitcase")
     """Classes to draw from."""
     spacing_m: Annotated[float, Field(ge=12)] = 14.0
     """Distance of neighbouring groups along the way."""

@@ -23,7 +23,7 @@ def test_the_map_s_world_is_appendix_c() -> None:
     scenario = load_scenario("thesis_map").scenario
     rows = appendix("c")
     expected = [(name, x, y) for row in rows for name, x, y in row[:3]]
-    assert [(spec.kind, *spec.at) for spec in scenario.objects] == expected
+    assert [(spec.class_name, *spec.at) for spec in scenario.objects] == expected
     stops = scenario.trajectory.waypoints
     assert [point.at for point in stops] == [tuple(row[3][1:3]) for row in rows]
     headings = [np.deg2rad(point.heading_deg) for point in stops if point.heading_deg is not None]

@@ -124,7 +124,7 @@ def _scattered(kind: Kind, recipe: Recipe, rng: np.random.Generator) -> Iterator
         if spot is not None:
             taken.append((spot, reach))
             yield ObjectSpec(
-                kind=name,
+                class_name=name,
                 at=(float(spot[0]), float(spot[1])),
                 yaw_deg=rng.uniform(0, 360),
                 variant=variant,

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mcap_landmarks.diff.fields import LIST_UNITS, MESSAGES, Items, View, pair_items
+from mcap_landmarks.diff.fields import LIST_UNITS, MESSAGES, ComparedMessages, Items, pair_items
 from mcap_landmarks.diff.pairs import Pairs
 from mcap_landmarks.diff.tally import Tally
 from mcap_landmarks.diff.values import Flags, Rows
@@ -42,25 +42,25 @@ class ChannelDiff:
         """Whether anything is not the same."""
         return self.rows.differs or self.messages.differs
 
-    def pair(self, baseline: View, candidate: View, times: Rows | None) -> None:
+    def pair(self, baseline: ComparedMessages, candidate: ComparedMessages, times: Rows | None) -> None:
         """Compare messages that belong together, at `times` (N,) in nanoseconds or outside time."""
         touched = None
         if baseline.items is not None and candidate.items is not None:
             touched = self._pair_items(baseline.items, candidate.items, times)
         self.messages.compare(baseline.batch(times), candidate.batch(times), also=touched)
 
-    def only(self, side: str, view: View, times: Rows | None) -> None:
+    def only(self, side: str, messages: ComparedMessages, times: Rows | None) -> None:
         """Count messages that are `added` or `removed`, and what is in them."""
-        self.messages.only(side, view.batch(times))
-        if view.items is not None:
-            self.rows.only(side, view.items.batch(times))
+        self.messages.only(side, messages.batch(times))
+        if messages.items is not None:
+            self.rows.only(side, messages.items.batch(times))
 
-    def equal(self, view: View) -> None:
+    def equal(self, messages: ComparedMessages) -> None:
         """Count messages whose bytes are the same, and what is in them."""
-        self.messages.same += view.rows
-        if view.items is not None:
-            self.rows.same += len(view.items.labels)
-            if ids := view.items.ids:
+        self.messages.same += messages.rows
+        if messages.items is not None:
+            self.rows.same += len(messages.items.labels)
+            if ids := messages.items.ids:
                 names = {name: name for name in ids.values[:, 0].tolist()}
                 self._there.update(names)
                 self._back.update(names)

@@ -96,7 +96,7 @@ class Items:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class ComparedMessages:
     """N messages as they are compared: the fields of each, and the items in them, if they are lists of such."""
 
     rows: int
@@ -108,13 +108,13 @@ class View:
         return Batch(self.fields, np.full(self.rows, b"", dtype=object), times)
 
 
-def view(ros_type: str, table: Table) -> View:
+def compared(ros_type: str, table: Table) -> ComparedMessages:
     """What there is to compare in messages of a type."""
     if ros_type in _LISTS:
         _, path, make = _LISTS[ros_type]
-        return View(table.rows, _fields(table, without=path), make(*table.children[path]))
+        return ComparedMessages(table.rows, _fields(table, without=path), make(*table.children[path]))
     fields = _fields(table)
-    return View(table.rows, _with_status_names(fields) if ros_type == LandmarkMatch.ROS_TYPE else fields)
+    return ComparedMessages(table.rows, _with_status_names(fields) if ros_type == LandmarkMatch.ROS_TYPE else fields)
 
 
 def pair_items(baseline: Items, candidate: Items) -> Pairs:

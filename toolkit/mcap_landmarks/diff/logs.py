@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mcap_landmarks.diff.channel import ChannelDiff
-from mcap_landmarks.diff.fields import Fields, View, unit_of, view
+from mcap_landmarks.diff.fields import ComparedMessages, Fields, compared, unit_of
 from mcap_landmarks.diff.pairs import pair_keys
 from mcap_landmarks.diff.values import Rows
 from mcap_landmarks.errors import MessageError
@@ -60,7 +60,7 @@ class Topic:
 
     def field_names(self) -> tuple[str, ...]:
         """The fields that are compared; those of a list's messages begin with `message.`."""
-        found = self._view([])
+        found = self._read([])
         names = tuple(found.fields.columns)
         if found.items is None:
             return names
@@ -82,39 +82,39 @@ class Topic:
         mine, theirs = self.waiting
         pairs = pair_keys([held.key_ns for held in mine], [held.key_ns for held in theirs])
         both = [(mine[i], theirs[j]) for i, j in zip(pairs.baseline.tolist(), pairs.candidate.tolist(), strict=True)]
-        for views, _ in self._views([a for a, b in both if a == b]):
-            self.diff.equal(views[0])
-        for views, times in self._views([a for a, b in both if a != b], [b for a, b in both if a != b]):
-            self.diff.pair(views[0], views[1], times)
+        for sides_read, _ in self._batches([a for a, b in both if a == b]):
+            self.diff.equal(sides_read[0])
+        for sides_read, times in self._batches([a for a, b in both if a != b], [b for a, b in both if a != b]):
+            self.diff.pair(sides_read[0], sides_read[1], times)
         for side, waiting, rows in (("removed", mine, pairs.removed), ("added", theirs, pairs.added)):
             left = [waiting[row] for row in rows.tolist()]
-            for views, times in self._views([held for held in left if held.log_time_ns < until_ns]):
-                self.diff.only(side, views[0], times)
+            for sides_read, times in self._batches([held for held in left if held.log_time_ns < until_ns]):
+                self.diff.only(side, sides_read[0], times)
             waiting[:] = [held for held in left if held.log_time_ns >= until_ns]
         return sum(len(held.data) for waiting in self.waiting for held in waiting)
 
-    def _views(self, *sides: Sequence[_Held]) -> Iterator[tuple[list[View], Rows]]:
-        """Views of messages that belong together, and their times; those that cannot be read are seen as bytes."""
+    def _batches(self, *sides: Sequence[_Held]) -> Iterator[tuple[list[ComparedMessages], Rows]]:
+        """Messages that belong together, side by side, and their times; those that cannot be read are seen as bytes."""
         count = len(sides[0])
         if not count:
             return
         try:
-            views = [self._view(side) for side in sides]
+            sides_read = [self._read(side) for side in sides]
         except MessageError:
             if count > 1:
-                yield from self._views(*(side[: count // 2] for side in sides))
-                yield from self._views(*(side[count // 2 :] for side in sides))
+                yield from self._batches(*(side[: count // 2] for side in sides))
+                yield from self._batches(*(side[count // 2 :] for side in sides))
                 return
-            views = [_content([_digest(held.data) for held in side]) for side in sides]
-        yield views, np.array([held.key_ns for held in sides[0]], dtype=np.int64)
+            sides_read = [_content([_digest(held.data) for held in side]) for side in sides]
+        yield sides_read, np.array([held.key_ns for held in sides[0]], dtype=np.int64)
 
-    def _view(self, messages: Sequence[_Held]) -> View:
+    def _read(self, messages: Sequence[_Held]) -> ComparedMessages:
         if self.layout is None:
             return _content([held.data for held in messages])
-        found = view(self.form, self.layout.table([held.data for held in messages]))
+        found = compared(self.form, self.layout.table([held.data for held in messages]))
         logged = np.array([held.log_time_ns for held in messages], dtype=np.int64)
         columns = {**found.fields.columns, "log_time_ns": Column(Kind.TIME, logged[:, None])}
-        return View(found.rows, Fields(columns, found.fields.counted), found.items)
+        return ComparedMessages(found.rows, Fields(columns, found.fields.counted), found.items)
 
 
 def compare_messages(
@@ -163,8 +163,8 @@ def _digest(data: bytes) -> bytes:
     return f"{len(data)} bytes, {hashlib.blake2b(data, digest_size=16).hexdigest()}".encode()
 
 
-def _content(digests: Sequence[bytes]) -> View:
+def _content(digests: Sequence[bytes]) -> ComparedMessages:
     """Messages of which only their bytes are compared."""
     values = np.empty((len(digests), 1), dtype=object)
     values[:, 0] = digests
-    return View(len(digests), Fields({"content": Column(Kind.TEXT, values)}))
+    return ComparedMessages(len(digests), Fields({"content": Column(Kind.TEXT, values)}))

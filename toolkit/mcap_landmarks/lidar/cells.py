@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.geometry.se2 import Array
-from mcap_landmarks.lidar.shape_table import Floats, Palette
+from mcap_landmarks.lidar.shape_table import Floats, ShapeTable
 from mcap_landmarks.lidar.windows import Rays
 
 SURFACE_M = 0.002
@@ -53,14 +53,14 @@ class Cells:
     half_turn_rad: Floats
     half_size: Floats
 
-    def blur_m2(self, shapes: Palette) -> Array:
+    def blur_m2(self, shapes: ShapeTable) -> Array:
         """The variance (R,) of what a cell's middle predicts for all of it."""
         turn, size = self.half_turn_rad * shapes.reach_m / 2, self.half_size * shapes.span_m / 2
         blur: Array = _BLUR * (np.square(self.half_across_m, dtype=np.float64) + turn**2 + size**2)
         return blur
 
 
-def first_cells(lateral_m: Array, shapes: Palette) -> Cells:
+def first_cells(lateral_m: Array, shapes: ShapeTable) -> Cells:
     """A coarse grid of all that the outermost hits (R, 2) allow, for shapes that are all round, or of one size, or none
     of either."""
     across, turns, sizes = 8, 16, 1
@@ -119,7 +119,7 @@ def sharp(noise: Noise) -> float:
 
 
 def weigh(
-    rays: tuple[Rays, Rays], cells: Cells, shapes: Palette, noise: Noise, passes: int
+    rays: tuple[Rays, Rays], cells: Cells, shapes: ShapeTable, noise: Noise, passes: int
 ) -> tuple[Cells, Array, Floats]:
     """The cells at their best distances, the logarithm of their weights, and how many hits these rest on (R, K).
 
@@ -152,7 +152,7 @@ def weigh(
     return cells, log_weights, number
 
 
-def _cast(rays: Rays, cells: Cells, shapes: Palette) -> Floats:
+def _cast(rays: Rays, cells: Cells, shapes: ShapeTable) -> Floats:
     """The range (P, K) at which each beam meets the shape in each cell of its row, very far where it passes."""
     x, y = cells.away_m[rays.row], cells.across_m[rays.row]
     offset = rays.ahead * y

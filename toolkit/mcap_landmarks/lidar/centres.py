@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.geometry.se2 import Array, rotation
 from mcap_landmarks.lidar.cells import SURFACE_M, Cells, Noise, finer, first_cells, sharp, weigh
-from mcap_landmarks.lidar.shape_table import Palette, palette
+from mcap_landmarks.lidar.shape_table import ShapeTable, shape_table
 from mcap_landmarks.lidar.shapes import Shape
 from mcap_landmarks.lidar.windows import Windows
 
@@ -47,7 +47,7 @@ def centres(
     position along the view follows from the hits in closed form. What explains a cluster far worse than another shape
     does is not refined. `allowed` (C, S) says which shapes come into question, if not all.
     """
-    known, many = palette(shapes), (len(window), len(shapes))
+    known, many = shape_table(shapes), (len(window), len(shapes))
     found = Centres(
         np.full(many, -np.inf),
         np.repeat(window.anchors_xy[:, None], many[1], axis=1),
@@ -63,7 +63,7 @@ def centres(
     return found
 
 
-def _possible(window: Windows, shapes: Palette) -> NDArray[np.bool_]:
+def _possible(window: Windows, shapes: ShapeTable) -> NDArray[np.bool_]:
     """Whether clusters (C, S) are no wider than the shapes, and no narrower where beams pass them on both sides.
 
     Nor may many beams pass between the hits, if the shapes have no holes.
@@ -93,7 +93,7 @@ class _Search:
     def __init__(
         self,
         window: Windows,
-        shapes: Palette,
+        shapes: ShapeTable,
         clusters: NDArray[np.intp],
         which: NDArray[np.intp],
         noise: Noise,

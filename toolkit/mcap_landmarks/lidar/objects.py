@@ -12,7 +12,7 @@ from mcap_landmarks.lidar.beams import Beams
 from mcap_landmarks.lidar.cells import Noise
 from mcap_landmarks.lidar.centres import centres
 from mcap_landmarks.lidar.segments import Cluster, extent_m, gap_m, hits_of, points_of
-from mcap_landmarks.lidar.shape_table import palette
+from mcap_landmarks.lidar.shape_table import shape_table
 from mcap_landmarks.lidar.shapes import Shape
 from mcap_landmarks.lidar.windows import windows
 
@@ -78,11 +78,11 @@ def objects(
     Neighbouring clusters make one object where that explains them better than an object each: the legs of a person, a
     box and its far corner, or what two LiDARs see of one thing.
     """
-    kinds = [(name, shape) for name, options in shapes.items() for shape in options]
-    explain = _Explainer(beams, kinds, _priors(shapes), noise)
+    named = [(name, shape) for name, options in shapes.items() for shape in options]
+    explain = _Explainer(beams, named, _priors(shapes), noise)
     joined = _joined(beams, clusters, explain)
     return [
-        _ranked([name for name, _ in kinds], explained, beams, cluster, noise)
+        _ranked([name for name, _ in named], explained, beams, cluster, noise)
         for cluster, explained in zip(joined, explain(joined), strict=True)
     ]
 
@@ -111,12 +111,12 @@ def _parts_m(shape: Shape) -> tuple[float, float]:
 class _Explainer:
     """Explains clusters, each but once."""
 
-    def __init__(self, beams: Beams, kinds: Sequence[tuple[str, Shape]], priors: Array, noise: Noise) -> None:
+    def __init__(self, beams: Beams, named: Sequence[tuple[str, Shape]], priors: Array, noise: Noise) -> None:
         self._beams, self._noise = beams, noise
-        self._shapes = list(dict.fromkeys(shape for _, shape in kinds))
-        self._row = np.array([self._shapes.index(shape) for _, shape in kinds], dtype=np.intp)
+        self._shapes = list(dict.fromkeys(shape for _, shape in named))
+        self._row = np.array([self._shapes.index(shape) for _, shape in named], dtype=np.intp)
         self._log_priors = np.log(priors)
-        reach_m = palette(self._shapes).reach_m
+        reach_m = shape_table(self._shapes).reach_m
         self._across_m = 2 * reach_m
         self._parts_m = np.array([_parts_m(shape) for shape in self._shapes]).reshape(-1, 2)
         # Where a shape does not fit, its centre is still about there.

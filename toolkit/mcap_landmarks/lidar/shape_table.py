@@ -19,7 +19,7 @@ PAST_M = np.float32(1e5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Palette:
+class ShapeTable:
     """S shapes: the depths of their profiles one after the other, and per shape (S,) where they begin and their layout.
 
     reach_m, turn_rad as the shapes have them; span_m: how much the largest size is wider than the smallest;
@@ -72,19 +72,19 @@ class Palette:
         return self.depths_m.take(index)
 
 
-def palette(shapes: Sequence[Shape]) -> Palette:
+def shape_table(shapes: Sequence[Shape]) -> ShapeTable:
     """The profiles of shapes, made once."""
-    return _palette(tuple(shapes))
+    return _shape_table(tuple(shapes))
 
 
 @cache
-def _palette(shapes: tuple[Shape, ...]) -> Palette:
+def _shape_table(shapes: tuple[Shape, ...]) -> ShapeTable:
     profiles = [profile(shape) for shape in shapes]
     layout = np.array([one.depths_m.shape for one in profiles], dtype=np.int32).reshape(-1, 3)
     ends = np.cumsum(layout.prod(axis=1))
     depths = [np.minimum(one.depths_m, PAST_M).ravel() for one in profiles]
     sizes, turns, _ = layout.T
-    return Palette(
+    return ShapeTable(
         np.concatenate(depths) if depths else np.zeros(0, dtype=np.float32),
         (ends - layout.prod(axis=1)).astype(np.int32),
         sizes,

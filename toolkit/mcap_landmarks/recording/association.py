@@ -8,7 +8,7 @@ from typing import Any
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.poses import Odometry
 from mcap_landmarks.messages.transforms import TFMessage, Transform
-from mcap_landmarks.recording.odometry_buffer import WIDEST_GAP_NS, Trail
+from mcap_landmarks.recording.odometry_buffer import WIDEST_GAP_NS, OdometryBuffer
 from mcap_landmarks.stage import Bundle, Channel
 
 WINDOW_NS = WIDEST_GAP_NS
@@ -69,7 +69,7 @@ class _Table:
         beside: Collection[Channel[Any]],
     ) -> None:
         self._primary, self._counts = primary, counts
-        self._trail = Trail() if with_odometry else None
+        self._odometry = OdometryBuffer() if with_odometry else None
         self._held = {channel: _Held() for channel in held}
         self._beside = {channel: _Beside() for channel in beside}
         self._waiting: deque[Bundle] = deque()
@@ -84,10 +84,10 @@ class _Table:
             self._held[channel].take(message)
         elif channel in self._beside:
             self._beside[channel].messages.append((stamp_ns, message))
-        elif self._trail is not None and isinstance(message, Odometry):
-            self._trail.add(stamp_ns, message)
-            self._counts.odometry_out_of_order = self._trail.out_of_order
-            self._counts.odometry_not_finite = self._trail.not_finite
+        elif self._odometry is not None and isinstance(message, Odometry):
+            self._odometry.add(stamp_ns, message)
+            self._counts.odometry_out_of_order = self._odometry.out_of_order
+            self._counts.odometry_not_finite = self._odometry.not_finite
 
     def ready(self, log_time_ns: int | None) -> Iterator[Bundle]:
         """The bundles that have nothing more to wait for at a log time; at the end, None, that is all."""
@@ -103,7 +103,7 @@ class _Table:
 
     def _is_complete(self, bundle: Bundle) -> bool:
         stamp_ns = bundle.stamp_ns
-        if self._trail is not None and self._trail.latest_ns < stamp_ns + self._duration_ns(bundle):
+        if self._odometry is not None and self._odometry.latest_ns < stamp_ns + self._duration_ns(bundle):
             return False
         if any(held.latest is None for held in self._held.values()):
             return False
@@ -118,12 +118,12 @@ class _Table:
         counts, found = self._counts, dict(bundle.messages)
         counts.bundles += 1
         odometry = None
-        if self._trail is not None:
-            odometry = self._trail.at(bundle.stamp_ns)
+        if self._odometry is not None:
+            odometry = self._odometry.at(bundle.stamp_ns)
             counts.without_odometry += odometry is None
             duration_ns = self._duration_ns(bundle)
             if odometry is not None and duration_ns:
-                odometry = replace(odometry, steps=self._trail.around(bundle.stamp_ns, duration_ns))
+                odometry = replace(odometry, steps=self._odometry.around(bundle.stamp_ns, duration_ns))
         found.update({channel: held.latest for channel, held in self._held.items() if held.latest is not None})
         for channel, partners in self._beside.items():
             partner = partners.pick(bundle.stamp_ns, self._stamps)

@@ -16,7 +16,7 @@ _SERVICE_EVENTS = "/_service_event"
 _TRANSIENT_LOCAL = re.compile(r"\bdurability:\s*(?:1|transient_local)\s*$", re.MULTILINE)
 
 
-def lasting(connections: Iterable[Connection]) -> list[Connection]:
+def latched(connections: Iterable[Connection]) -> list[Connection]:
     """The connections whose messages hold until the next one comes.
 
     These are camera information, static transforms and whatever else was latched, but for logs and service events,
@@ -25,13 +25,13 @@ def lasting(connections: Iterable[Connection]) -> list[Connection]:
     sensors' mounting among the others.
     """
     every = list(connections)
-    found = [connection for connection in every if _is_lasting(connection)]
+    found = [connection for connection in every if _is_latched(connection)]
     if not any(connection.message_type == TFMessage.ROS_TYPE for connection in found):
         found += [connection for connection in every if connection.message_type == TFMessage.ROS_TYPE]
     return found
 
 
-def _is_lasting(connection: Connection) -> bool:
+def _is_latched(connection: Connection) -> bool:
     if connection.message_type in _LOG_TYPES or connection.topic.endswith(_SERVICE_EVENTS):
         return False
     is_static = connection.topic.endswith(TF_STATIC.topic) and connection.message_type == TFMessage.ROS_TYPE

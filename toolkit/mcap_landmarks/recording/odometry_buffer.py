@@ -39,7 +39,7 @@ def odometry_from(message: Message) -> Odometry | None:
     return None
 
 
-class Trail:
+class OdometryBuffer:
     """The last seconds of odometry, by stamp. `out_of_order` and `not_finite` count the messages that were no use."""
 
     def __init__(self) -> None:

@@ -15,7 +15,7 @@ from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog, open_logs
 from mcap_landmarks.manifest import CARRIED, RUN, Manifest, entry_text, file_hash
 from mcap_landmarks.messages.qos import KEY
-from mcap_landmarks.recording.latched import carried_note, lasting, latest
+from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.runs.outputs import make_folder, output_files
 from mcap_landmarks.sources import Piece, merge
@@ -214,7 +214,7 @@ class _Job:
     def _before_start(self) -> list[RawMessage]:
         """What holds at the start that was chosen because of messages before it."""
         start_ns = self._selection.start_ns
-        return [] if start_ns is None else latest(self._messages(lasting(self._unified), None, start_ns), start_ns)
+        return [] if start_ns is None else latest(self._messages(latched(self._unified), None, start_ns), start_ns)
 
     def _account(self, done: Converted, counts: Counter[Connection], carried: int) -> None:
         """Compare what was read with what the storage declares; with no message but carried ones there is no output."""

@@ -18,7 +18,7 @@ from mcap_landmarks.manifest import (
     told_carried,
     told_losses,
 )
-from mcap_landmarks.recording.latched import carried_note, lasting, latest
+from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.layered_log import Layer, View, own_layer
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.recording.writer import RecordingWriter, create_recording
@@ -76,7 +76,7 @@ def _write(
 
 def _before(view: View, start_ns: int) -> list[RawMessage]:
     """What holds at the start of an output because of messages before it."""
-    return latest(view.messages(lasting(entry.connection for entry in view.channels), None, start_ns), start_ns)
+    return latest(view.messages(latched(entry.connection for entry in view.channels), None, start_ns), start_ns)
 
 
 def _own(bench: Bench, results: Sequence[Layer]) -> Layer:
