@@ -44,9 +44,23 @@ def subcommand(verb: str, words: list[str]) -> list[str]:
     return [verb, words[0]] if verb == "landmarks" else [verb]
 
 
-def test_linked_files_exist() -> None:
-    for target in re.findall(r"\]\((?!http)([^)#]+)\)", README):
-        assert (ROOT / target).exists(), target
+def test_links_of_the_readme_are_absolute_and_their_files_exist() -> None:
+    """A package's page shows the README without the files beside it."""
+    targets = re.findall(r"\]\(([^)#]+)\)", README)
+    assert targets
+    for target in targets:
+        found = re.fullmatch(
+            r"https://(?:github|raw\.githubusercontent)\.com/\w[\w-]*/mcap-landmarks/(?:blob/)?main/(.+)", target
+        )
+        assert found, target
+        assert (ROOT / found[1]).exists(), target
+
+
+@pytest.mark.parametrize("document", sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("docs/*.md")))
+def test_linked_files_of_the_documents_exist(document: str) -> None:
+    folder = (ROOT / document).parent
+    for target in re.findall(r"\]\((?!http)([^)#]+)\)", (ROOT / document).read_text()):
+        assert (folder / target).exists(), target
 
 
 def test_nothing_names_a_registry_or_a_machine() -> None:
