@@ -7,6 +7,8 @@ from mcap_landmarks.estimation import closed_form
 from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array, rotation, transform_points
 
+# The widest pairs that are tried, the points that judge a transform, all comparisons of points (some ten seconds), and
+# the share of the judges whose support ends the search: more than half cannot be had twice.
 _PAIRS, _JUDGES, _BUDGET, _ENOUGH = 200, 50, 3 * 10**8, 0.5
 
 

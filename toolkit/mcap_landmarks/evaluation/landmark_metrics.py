@@ -13,6 +13,7 @@ from mcap_landmarks.messages.scene import SceneObjects
 GATE_M = 3.0
 """A landmark that is farther off than this is missing, and another one spurious."""
 _ROUNDS = 20
+"""Fit and pairing take turns until nothing changes; this ends them if they run in a circle."""
 
 
 def landmark_figures(estimate: SceneObjects, reference: SceneObjects) -> dict[str, int | float | None]:

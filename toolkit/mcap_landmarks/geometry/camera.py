@@ -8,6 +8,8 @@ from numpy.typing import ArrayLike
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.geometry.se2 import Array
 
+# Newton's steps to undo a distortion, the width over which its slope is taken, and how far out (as a tangent, 84
+# degrees) a pinhole's distortion is looked at for where it folds back.
 _STEPS, _SLOPE_OVER, _WIDEST = 20, 1e-6, 10.0
 _PINHOLE, _FISHEYE = ("", "plumb_bob", "rational_polynomial"), ("equidistant", "fisheye")
 

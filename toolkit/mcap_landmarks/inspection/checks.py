@@ -28,6 +28,7 @@ _LEAST_SCANS = 10
 _LEAST_BEAMS = 3
 """Fewer dark beams side by side are dirt or chance, not something in the way."""
 _MOST_SECTORS = 3
+"""So many dark sectors are named, the longest: the posts of a robot are three or four."""
 _BASES = ("base_footprint", "base_link")
 
 

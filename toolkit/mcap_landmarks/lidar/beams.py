@@ -12,6 +12,7 @@ from mcap_landmarks.geometry.se2 import Array, compose
 _SEAM = 2.5
 """Beams that are so many times farther apart than most have something between them that nobody looked at."""
 _AT_LIMIT_M = 1e-3
+"""A range so near to the upper limit says that there was no echo: drivers round to float32."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,6 +17,7 @@ _ENOUGH, _MANY = 5.0, 12.0
 _BLURRED = 4.0
 """A grid is too coarse where its cells add so much more to the variance of a hit."""
 _LEVELS = 3
+"""So often a grid is refined at most: each time its cells become a quarter as wide."""
 _HOPELESS = 12.0
 """A shape whose evidence is lower than another's by this logarithm needs no better place."""
 _LOST = 1 / 3

@@ -12,7 +12,9 @@ from mcap_landmarks.geometry.se2 import Array
 OFFSETS = 321
 """How many rays there are in a profile side by side; the outermost two on either side pass the shape."""
 _TURN_ERROR_M = 0.003
+"""Between two headings of a profile the farthest point moves by no more than twice this: below the noise of a range."""
 _SIZES = 17
+"""Sizes of a profile, evenly spaced: legs 0.16 to 0.32 m apart come in steps of a centimetre, the noise of a range."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,9 @@ Floats = NDArray[np.float32]
 _DENSE_M, _FAR_BESIDE_M, _APART_M = 0.65, 5.0, 0.03
 """Beams are looked at beside the outermost hits: every one that is so far from the next, densely at first."""
 _MOST_HITS = 24
+"""More hits than these, evenly thinned, say nothing new of where an object is: shapes err by more than noise then."""
 _FAR_M = 1e4
+"""Stands in for a beam that met nothing: beyond every range, and finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
