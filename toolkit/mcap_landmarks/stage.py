@@ -5,13 +5,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Protocol
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.geometry.se2 import Array, between, exp, interpolate
 from mcap_landmarks.messages.codec import M, Message
+
+M_co = TypeVar("M_co", bound=Message, covariant=True)
+"""A `Channel[Message]` is a channel of any messages, since a channel only says which its are."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,18 +69,18 @@ class RawMessage(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Channel(Generic[M]):
+class Channel(Generic[M_co]):
     """A topic and the dataclass of its messages."""
 
     topic: str
-    message: type[M]
+    message: type[M_co]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stamped:
     """A message on its way into a recording."""
 
-    channel: Channel[Any]
+    channel: Channel[Message]
     log_time_ns: int
     message: Message
 
@@ -127,7 +130,7 @@ class Bundle:
 
     stamp_ns: int
     log_time_ns: int
-    messages: Mapping[Channel[Any], Message]
+    messages: Mapping[Channel[Message], Message]
     odometry: OdometryAt | None = None
 
     def get(self, channel: Channel[M]) -> M | None:
@@ -165,8 +168,8 @@ class Stage:
     """
 
     name: str
-    reads: tuple[Channel[Any], ...]
-    writes: tuple[Channel[Any], ...]
+    reads: tuple[Channel[Message], ...]
+    writes: tuple[Channel[Message], ...]
     config: type[Any]
     process: Process
     resources: tuple[str, ...] = ()
@@ -183,8 +186,8 @@ class Reduction:
     """
 
     name: str
-    reads: tuple[Channel[Any], ...]
-    writes: tuple[Channel[Any], ...]
+    reads: tuple[Channel[Message], ...]
+    writes: tuple[Channel[Message], ...]
     config: type[Any]
     collect: Callable[[Iterable[Bundle], Any], Any]
     solve: Callable[..., Any]
