@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mcap_landmarks import channels
 from mcap_landmarks.cli.main import run
-from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage
 from mcap_landmarks.messages.poses import Odometry, PoseStamped
 from mcap_landmarks.messages.transforms import TFMessage, Transform
@@ -49,7 +49,7 @@ def messages(count: int = 5) -> list[Stamped]:
     return sorted(found, key=lambda stamped: stamped.log_time_ns)
 
 
-def without(found: list[Stamped], *gone: Channel[Any]) -> list[Stamped]:
+def without(found: list[Stamped], *gone: Channel[Message]) -> list[Stamped]:
     return [stamped for stamped in found if stamped.channel not in gone]
 
 
@@ -117,7 +117,7 @@ def test_transforms_from_before_the_start_count(tmp_path: Path) -> None:
     ids=lambda value: getattr(value, "topic", ""),
 )
 def test_what_is_missing_is_said(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], gone: Channel[Any], said: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], gone: Channel[Message], said: str
 ) -> None:
     log, out = write(tmp_path / "log.mcap", without(messages(), gone)), tmp_path / "out.mcap"
     assert fuse(log, out) == 1

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap_landmarks.channels import ODOMETRY, SCAN, TF
+from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.recording.reader import open_recording
@@ -23,7 +24,7 @@ POSES = Channel("/slam/pose", PoseStamped)
 SLICED = ("--scan-from", CLOUD.topic, "--slice", "-0.1:0.1")
 
 
-def changed(topic: Channel[Any], change: Callable[[Stamped], Stamped]) -> list[Stamped]:
+def changed(topic: Channel[Message], change: Callable[[Stamped], Stamped]) -> list[Stamped]:
     """The log of a robot that creeps towards a person and a hydrant, its messages of a topic changed."""
     return [change(stamped) if stamped.channel == topic else stamped for stamped in raw_messages()]
 

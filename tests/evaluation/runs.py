@@ -29,7 +29,7 @@ START_NS, STEP_NS, BUNDLES = 1_700_000_000 * 10**9, 10**8, 6
 STATUS = Channel("/status", UInt8)
 FOREIGN = Connection("/foreign", "odd/msg/Thing", b"{}", "jsonschema", "json")
 Row = int | tuple[int, ...]
-Entry = tuple[Channel[Any], int, Message]
+Entry = tuple[Channel[Message], int, Message]
 CONFIG = {"localize": {"max_sigma_m": 0.5}}
 
 

@@ -15,7 +15,7 @@ from mcap_landmarks.cli.main import run
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.geometry.se2 import Array
-from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage
 from mcap_landmarks.messages.points import PointCloud2
@@ -144,7 +144,7 @@ def output(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def read(path: Path, channel: Channel[Any]) -> list[Any]:
+def read(path: Path, channel: Channel[Message]) -> list[Any]:
     with open_recording(path) as recording:
         raws = recording.messages(recording.connections(channel.topic))
         return [decode(channel.message, raw.data) for raw in raws]

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from mcap_landmarks.evaluation.trajectory import Indices, Trajectory
 from mcap_landmarks.geometry.angles import yaw_from_quaternion
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.maps.scene_objects import usable
-from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.columns import Table
 from mcap_landmarks.messages.layout import layout_of
 from mcap_landmarks.messages.match import LandmarkMatch, Status
@@ -47,7 +46,7 @@ class Collected:
     broken: Counter[str] = field(default_factory=Counter)
     losses: list[str] = field(default_factory=list)
 
-    def add(self, channel: Channel[Any], logged_ns: Sequence[int], messages: Sequence[bytes]) -> None:
+    def add(self, channel: Channel[Message], logged_ns: Sequence[int], messages: Sequence[bytes]) -> None:
         """Take messages of a channel, in the order of their log times; those that cannot be decoded are counted.
 
         Raises:

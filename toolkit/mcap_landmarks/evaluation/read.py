@@ -1,7 +1,6 @@
 """What is evaluated, from files: recordings with results, landmark databases, Appendix D's text, TUM trajectories."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from mcap_landmarks.maps.database import read_map
 from mcap_landmarks.maps.exchange import read_text
 from mcap_landmarks.maps.exchange_thesis import parse_results
 from mcap_landmarks.maps.map_message import scene_from_map
+from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.stage import Channel, Connection, Progress
@@ -87,11 +87,11 @@ def is_database(path: Path) -> bool:
         return path.suffix == ".db"  # opening it says what is wrong
 
 
-def _collect(path: Path, channels: tuple[Channel[Any], ...], progress: Progress | None) -> Collected:
+def _collect(path: Path, channels: tuple[Channel[Message], ...], progress: Progress | None) -> Collected:
     found = Collected(str(path))
     with open_recording(path) as recording:
         connections = _connections(recording, channels)
-        held: dict[Channel[Any], tuple[list[int], list[bytes]]] = {}
+        held: dict[Channel[Message], tuple[list[int], list[bytes]]] = {}
         for raw in recording.messages(connections, progress=progress):
             channel = connections[raw.connection]
             if channel.topic in found.once:
@@ -108,7 +108,7 @@ def _collect(path: Path, channels: tuple[Channel[Any], ...], progress: Progress 
     return found
 
 
-def _connections(recording: Recording, channels: tuple[Channel[Any], ...]) -> dict[Connection, Channel[Any]]:
+def _connections(recording: Recording, channels: tuple[Channel[Message], ...]) -> dict[Connection, Channel[Message]]:
     connections = {connection: channel for channel in channels for connection in recording.connections(channel.topic)}
     for connection, channel in connections.items():
         needed = channel.message.ROS_TYPE
@@ -122,7 +122,7 @@ def _connections(recording: Recording, channels: tuple[Channel[Any], ...]) -> di
     return connections
 
 
-def _foreign_scenes(recording: Recording) -> dict[Connection, Channel[Any]]:
+def _foreign_scenes(recording: Recording) -> dict[Connection, Channel[Message]]:
     """The one topic of scene objects that somebody else wrote, if there is one."""
     found = [entry.connection for entry in recording.channels if entry.connection.message_type == SceneObjects.ROS_TYPE]
     foreign = [connection for connection in found if connection.topic not in NO_SCENES]

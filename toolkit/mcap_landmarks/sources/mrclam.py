@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,7 +135,7 @@ def _stamped(track: _Track, first: int, stop: int, progress: Progress | None) ->
             progress(int(1024 * track.row_bytes))
 
 
-def _connection(channel: Channel[Any], *, latched: bool = False) -> Connection:
+def _connection(channel: Channel[Message], *, latched: bool = False) -> Connection:
     ros_type = channel.message.ROS_TYPE
     return Connection(
         channel.topic, ros_type, definition(ros_type).encode(), metadata={KEY: qos_profile(latched=latched)}
@@ -144,7 +143,7 @@ def _connection(channel: Channel[Any], *, latched: bool = False) -> Connection:
 
 
 def _track(
-    channel: Channel[Any], table: Table, time_ns: NDArray[np.int64], message: Callable[[int], Message]
+    channel: Channel[Message], table: Table, time_ns: NDArray[np.int64], message: Callable[[int], Message]
 ) -> _Track:
     return _Track(_connection(channel), time_ns, message, table.size_bytes / max(len(time_ns), 1))
 
