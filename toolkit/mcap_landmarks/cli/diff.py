@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -12,8 +12,13 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import DONE, USAGE, moment, progress, say, say_json, table, warn
 from mcap_landmarks.errors import ToolkitError, UsageError
 
+if TYPE_CHECKING:
+    from mcap_landmarks.diff.comparison import Diff
+    from mcap_landmarks.diff.document import CaseEntry, ChannelEntry, DiffDocument, FieldEntry, MetricEntry
+
 DIFFERENT = 1
 _SHOWN, _FIELDS = 3, 8
+"""So many additions, removals and fields of a channel are shown; the JSON has all."""
 _LONGEST = 60
 _HASH = re.compile("[0-9a-f]{32,}")
 
@@ -66,19 +71,24 @@ def command(
         say_json("diff", found.document)
     else:
         _print(found.document)
-    counts = [channel[name] for channel in found.document["channels"].values() for name in ("same", "changed")]
-    if counts and not any(counts):
-        remedy = "try --align" if "landmarks" in found.document["channels"] else "are they of the same recording?"
+    _warn(found)
+    if found.losses:
+        raise typer.Exit(USAGE)
+    raise typer.Exit(DIFFERENT if found.fails else DONE)
+
+
+def _warn(found: "Diff") -> None:
+    channels = found.document["channels"]
+    if channels and not any(channel["same"] or channel["changed"] for channel in channels.values()):
+        remedy = "try --align" if "landmarks" in channels else "are they of the same recording?"
         warn(f"note: nothing of the one has its like in the other; {remedy}")
     for loss in found.losses:
         warn(f"warning: {loss}")
     if found.losses:
         warn("error: what cannot be read was not compared; recover the log first")
-        raise typer.Exit(USAGE)
-    raise typer.Exit(DIFFERENT if found.fails else DONE)
 
 
-def _print(document: dict[str, Any]) -> None:
+def _print(document: "DiffDocument") -> None:
     channels = document["channels"]
     touched = {name: channel for name, channel in channels.items() if _differs(channel)}
     if document["identical"]:
@@ -87,8 +97,9 @@ def _print(document: dict[str, Any]) -> None:
         say(f"same: {_many(len(channels), 'channel')}, nothing beyond tolerance")
     else:
         say(f"different: {len(touched)} of {_many(len(channels), 'channel')}")
-    _print_rows("meant to differ", ((row["key"], row) for row in document["manifest"]))
-    _print_rows("structure", ((f"{row['what']} {row['name']}", row) for row in document["structure"]))
+    _print_rows("meant to differ", ((row["key"], row["baseline"], row["candidate"]) for row in document["manifest"]))
+    structure = document["structure"]
+    _print_rows("structure", ((f"{row['what']} {row['name']}", row["baseline"], row["candidate"]) for row in structure))
     if touched:
         _print_counts(touched)
     for name, channel in touched.items():
@@ -101,43 +112,53 @@ def _print(document: dict[str, Any]) -> None:
         say(f"\n{'fails' if entry['holds'] else 'holds not'}: {entry['condition']} (it is {_number(entry['value'])})")
 
 
-def _print_rows(head: str, rows: Iterable[tuple[str, dict[str, Any]]]) -> None:
-    lines = [[_short(name), _value(row["baseline"]), _value(row["candidate"])] for name, row in rows]
+def _print_rows(head: str, rows: Iterable[tuple[str, object, object]]) -> None:
+    lines = [[_short(name), _value(baseline), _value(candidate)] for name, baseline, candidate in rows]
     if lines:
         say()
         table([head, "baseline", "candidate"], lines)
 
 
-def _print_counts(channels: dict[str, Any]) -> None:
-    counts = ("same", "changed", "added", "removed")
+def _print_counts(channels: "dict[str, ChannelEntry]") -> None:
+    from mcap_landmarks.diff.document import COUNTS
+
     say()
     rows = []
     for name, channel in channels.items():
-        rows.append([name, *(str(channel[count]) for count in counts), channel["unit"]])
+        rows.append([name, *(str(channel[count]) for count in COUNTS), channel["unit"]])
         messages = channel["messages"]
-        if any(messages[count] != channel[count] for count in ("added", "removed")):
-            rows.append(["", *(str(messages[count]) for count in counts), "messages"])
-    table(["channel", *counts, "counted"], rows)
+        if messages["added"] != channel["added"] or messages["removed"] != channel["removed"]:
+            rows.append(["", *(str(messages[count]) for count in COUNTS), "messages"])
+    table(["channel", *COUNTS, "counted"], rows)
 
 
-def _print_channel(name: str, channel: dict[str, Any]) -> None:
+def _print_channel(name: str, channel: "ChannelEntry") -> None:
     say(f"\n{name}")
     unit = channel["unit"].removesuffix("s")
-    for side in ("removed", "added"):
-        of = "baseline" if side == "removed" else "candidate"
-        cases = [case for case in channel["worst"] if case["field"] == unit and case[of] is not None]
-        if cases:
-            classes = {label: counts[side] for label, counts in channel["classes"].items() if counts[side]}
-            named = ", ".join(f"{label} {count}" for label, count in classes.items())
-            say(f"  {side}: {channel[side]} {named and f'({named})'}".rstrip())
-        for case in cases[:_SHOWN]:
-            say(
-                f"    {_when(case)}{', '.join(f'{key} {_value(value)}' for key, value in case[of].items())}".rstrip(
-                    " :"
-                )
-            )
-        if cases and channel[side] > _SHOWN:
-            say(f"    and {channel[side] - _SHOWN} more")
+    alone = [case for case in channel["worst"] if case["field"] == unit]
+    _print_alone("removed", channel, [(case, case["baseline"]) for case in alone])
+    _print_alone("added", channel, [(case, case["candidate"]) for case in alone])
+    _print_fields(channel)
+
+
+def _print_alone(
+    side: Literal["removed", "added"], channel: "ChannelEntry", cases: "Iterable[tuple[CaseEntry, object]]"
+) -> None:
+    """What only one side has, with the values of the first; those that lie on the other side have none here."""
+    first = [(case, values) for case, values in cases if isinstance(values, dict)]
+    if not first:
+        return
+    counts = {label: entry[side] for label, entry in channel["classes"].items()}
+    named = ", ".join(f"{label} {count}" for label, count in counts.items() if count)
+    say(f"  {side}: {channel[side]} {named and f'({named})'}".rstrip())
+    for case, values in first[:_SHOWN]:
+        told = ", ".join(f"{key} {_value(value)}" for key, value in values.items())
+        say(f"    {_when(case)}{told}".rstrip(" :"))
+    if channel[side] > _SHOWN:
+        say(f"    and {channel[side] - _SHOWN} more")
+
+
+def _print_fields(channel: "ChannelEntry") -> None:
     fields = list(channel["fields"].items())
     for field, entry in fields[:_FIELDS]:
         case = next(case for case in channel["worst"] if case["field"].partition("[")[0] == field)
@@ -146,7 +167,7 @@ def _print_channel(name: str, channel: dict[str, Any]) -> None:
         say(f"  and {len(fields) - _FIELDS} more fields: {', '.join(name for name, _ in fields[_FIELDS:])}")
 
 
-def _how(field: str, entry: dict[str, Any], case: dict[str, Any]) -> str:
+def _how(field: str, entry: "FieldEntry", case: "CaseEntry") -> str:
     """How a field changed: which words became which, else the worst case."""
     if entry["transitions"]:
         words = (
@@ -155,13 +176,13 @@ def _how(field: str, entry: dict[str, Any], case: dict[str, Any]) -> str:
         )
         return ": " + ", ".join(words)
     largest = f", by {_difference(field, entry['largest'])} at most" if entry["largest"] else ""
-    values = " -> ".join(_value(case[side], field) for side in ("baseline", "candidate"))
+    values = f"{_value(case['baseline'], field)} -> {_value(case['candidate'], field)}"
     return f"{largest}; {_when(case)}{case['field'].removeprefix(field)} {values}".replace(":  ", ": ")
 
 
-def _print_metrics(metrics: dict[str, Any]) -> None:
+def _print_metrics(metrics: "dict[str, MetricEntry]") -> None:
     rows = [
-        [name, *(_number(values[side]) for side in ("baseline", "candidate", "delta"))]
+        [name, _number(values["baseline"]), _number(values["candidate"]), _number(values["delta"])]
         for name, values in metrics.items()
         if values["baseline"] != values["candidate"] and not name.startswith("axis.")  # the thesis's own, in the JSON
     ]
@@ -172,17 +193,16 @@ def _print_metrics(metrics: dict[str, Any]) -> None:
         say("\nthe metrics are the same")
 
 
-def _differs(channel: dict[str, Any]) -> bool:
-    counts = (channel, channel["messages"])
-    return any(count[name] for count in counts for name in ("changed", "added", "removed"))
+def _differs(channel: "ChannelEntry") -> bool:
+    return any(count["changed"] or count["added"] or count["removed"] for count in (channel, channel["messages"]))
 
 
-def _when(case: dict[str, Any]) -> str:
+def _when(case: "CaseEntry") -> str:
     parts = [moment(case["time_ns"]) if case["time_ns"] is not None else "", case["item"] or ""]
     return " ".join(part for part in parts if part) + ": "
 
 
-def _value(value: Any, field: str = "") -> str:  # noqa: ANN401 - any JSON value
+def _value(value: object, field: str = "") -> str:
     if value is None:
         return "-"
     if isinstance(value, list):

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mcap_landmarks.diff.document import ChannelEntry, Unpaired
 from mcap_landmarks.diff.fields import LIST_UNITS, MESSAGES, ComparedMessages, Items, pair_items
 from mcap_landmarks.diff.pairs import Pairs
 from mcap_landmarks.diff.tally import Tally
@@ -65,23 +66,28 @@ class ChannelDiff:
                 self._there.update(names)
                 self._back.update(names)
 
-    def document(self) -> dict[str, object]:
+    def document(self) -> ChannelEntry:
         """An entry of `channels`."""
         tallies = [self.rows] if self.rows is self.messages else [self.messages, self.rows]
         fields = {name: entry for tally in tallies for name, entry in tally.fields.items() if entry.changed}
-        classes = self.rows.classes
-        names = sorted({*classes["added"], *classes["removed"]} - {""}) if self.unit in CLASSED else []
-        worst = [case for side in ("removed", "added") for case in self.rows.alone[side]]
+        worst = [*self.rows.alone["removed"], *self.rows.alone["added"]]
         worst += [case for entry in fields.values() for case in entry.cases]
         return {
             "type": self.kind,
             "unit": self.unit,
             **self.rows.counts(),
             "messages": self.messages.counts(),
-            "classes": {name: {side: classes[side][name] for side in ("added", "removed")} for name in names},
+            "classes": self._classes(),
             "fields": {name: entry.document() for name, entry in fields.items()},
             "worst": [case.document() for case in worst],
         }
+
+    def _classes(self) -> dict[str, Unpaired]:
+        """How many of each class only one side has, where what is counted is of a class."""
+        if self.unit not in CLASSED:
+            return {}
+        added, removed = self.rows.classes["added"], self.rows.classes["removed"]
+        return {name: {"added": added[name], "removed": removed[name]} for name in sorted({*added, *removed} - {""})}
 
     def _pair_items(self, baseline: Items, candidate: Items, times: Rows | None) -> Flags:
         """Compare the items of messages (N,) that belong together; which messages have any that is not the same."""

@@ -4,12 +4,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from mcap_landmarks.channels import ANNOTATIONS
 from mcap_landmarks.diff.channel import ChannelDiff
 from mcap_landmarks.diff.conditions import Condition, figures
-from mcap_landmarks.diff.declared import Row, by_topic, manifest_rows, structure_rows
+from mcap_landmarks.diff.declared import by_topic, manifest_rows, structure_rows
+from mcap_landmarks.diff.document import DiffDocument, ManifestRow, MetricEntry, StructureRow
 from mcap_landmarks.diff.logs import Topic, compare_messages
 from mcap_landmarks.diff.maps import FIELDS, diff_maps
 from mcap_landmarks.diff.metrics import metric_names, metric_rows
@@ -28,7 +28,7 @@ from mcap_landmarks.stage import Progress, Tolerance
 class Diff:
     """The document of `diff --json` (schemas/json/diff.schema.json), and what could not be read."""
 
-    document: dict[str, Any]
+    document: DiffDocument
     losses: list[str] = field(default_factory=list)
 
     @property
@@ -156,12 +156,12 @@ def _counted(recording: Recording) -> dict[str, ChannelDiff]:
 def _document(
     channels: Mapping[str, ChannelDiff],
     *,
-    manifest: Sequence[Row] = (),
-    structure: Sequence[Row] = (),
-    metrics: Mapping[str, object] | None = None,
+    manifest: Sequence[ManifestRow] = (),
+    structure: Sequence[StructureRow] = (),
+    metrics: Mapping[str, MetricEntry] | None = None,
     alignment: dict[str, float] | None = None,
     identical: bool = False,
-) -> dict[str, Any]:
+) -> DiffDocument:
     differs = bool(structure) or any(channel.differs for channel in channels.values())
     return {
         "verdict": "different" if differs else "same",
@@ -186,7 +186,7 @@ def _equal_bytes(baseline: Path, candidate: Path) -> bool:
 
 
 def _judged(
-    document: dict[str, Any], conditions: Sequence[Condition], names: Mapping[str, Sequence[str]], losses: list[str]
+    document: DiffDocument, conditions: Sequence[Condition], names: Mapping[str, Sequence[str]], losses: list[str]
 ) -> Diff:
     if conditions:
         known = figures(document, metric_names(), names)

@@ -5,8 +5,8 @@ import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from mcap_landmarks.diff.document import COUNTS, DiffDocument, FieldEntry, MetricEntry
 from mcap_landmarks.diff.tolerances import nearest
 from mcap_landmarks.errors import UsageError
 
@@ -19,7 +19,8 @@ _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     ">": operator.gt,
 }
 _FORM = re.compile(r"\s*(?P<name>[^\s<>=!]+)\s*(?P<comparison><=|>=|==|!=|<|>)\s*(?P<limit>\S+)\s*")
-_COUNTS = ("same", "changed", "added", "removed")
+_UNKNOWN: MetricEntry = {"baseline": None, "candidate": None, "delta": None}
+_UNCHANGED: FieldEntry = {"changed": 0, "largest": 0.0, "tolerance": {}, "transitions": []}
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,7 @@ def parse(text: str) -> Condition:
 
 
 def figures(
-    document: Mapping[str, Any], metric_names: Sequence[str], field_names: Mapping[str, Sequence[str]]
+    document: DiffDocument, metric_names: Sequence[str], field_names: Mapping[str, Sequence[str]]
 ) -> dict[str, float | None]:
     """Everything in a diff that a condition may name.
 
@@ -78,15 +79,15 @@ def figures(
     """
     found: dict[str, float | None] = {}
     for name in metric_names:
-        values = document["metrics"].get(name, {})
-        found[name] = values.get("candidate")
-        found[f"baseline.{name}"], found[f"delta.{name}"] = values.get("baseline"), values.get("delta")
-    for count in _COUNTS:
+        values = document["metrics"].get(name, _UNKNOWN)
+        found[name] = values["candidate"]
+        found[f"baseline.{name}"], found[f"delta.{name}"] = values["baseline"], values["delta"]
+    for count in COUNTS:
         found[count] = sum(channel[count] for channel in document["channels"].values())
     for topic, channel in document["channels"].items():
-        found.update({f"channels.{topic}.{count}": channel[count] for count in _COUNTS})
+        found.update({f"channels.{topic}.{count}": channel[count] for count in COUNTS})
         for name in field_names[topic]:
-            entry = channel["fields"].get(name, {"changed": 0, "largest": 0.0})
+            entry = channel["fields"].get(name, _UNCHANGED)
             largest = math.inf if entry["largest"] is None else entry["largest"]
             found[f"channels.{topic}.fields.{name}.changed"] = entry["changed"]
             found[f"channels.{topic}.fields.{name}.largest"] = largest

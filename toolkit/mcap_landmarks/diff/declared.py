@@ -4,18 +4,16 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from typing import Any
 
-from mcap_landmarks.diff.logs import shared_layout
+from mcap_landmarks.diff.document import ManifestRow, StructureRow
+from mcap_landmarks.diff.logs import Connections, shared_layout
 from mcap_landmarks.manifest import RUN
 from mcap_landmarks.recording.reader import Recording
-from mcap_landmarks.stage import Connection
 
-Row = dict[str, Any]
 _FOLLOWS = re.compile(r"content|carried(\..*)?|options\.logs|stages\.[^.]*\.(key|outcome|inputs|resources|code)(\..*)?")
 
 
-def manifest_rows(baseline: Mapping[str, str], candidate: Mapping[str, str]) -> list[Row]:
+def manifest_rows(baseline: Mapping[str, str], candidate: Mapping[str, str]) -> list[ManifestRow]:
     """What was meant to differ: each entry of the manifests that does, but for those that follow from others."""
     rows = rows_of(_entries(baseline), _entries(candidate))
     return [row for row in rows if not _FOLLOWS.fullmatch(row["key"])]
@@ -30,7 +28,7 @@ def _code(stages: object) -> str | None:
     )
 
 
-def rows_of(baseline: Mapping[str, object], candidate: Mapping[str, object]) -> list[Row]:
+def rows_of(baseline: Mapping[str, object], candidate: Mapping[str, object]) -> list[ManifestRow]:
     """One row per key whose values differ; a key that a side lacks has None there."""
     keys = sorted({*baseline, *candidate})
     return [
@@ -40,41 +38,43 @@ def rows_of(baseline: Mapping[str, object], candidate: Mapping[str, object]) -> 
     ]
 
 
-def structure_rows(baseline: Recording, candidate: Recording) -> list[Row]:
+def structure_rows(baseline: Recording, candidate: Recording) -> list[StructureRow]:
     """Channels that only one has, whose type, definition or number of messages differs; metadata and attachments."""
     mine, theirs = by_topic(baseline), by_topic(candidate)
     counts = _message_counts(baseline), _message_counts(candidate)
     rows = []
     for topic in sorted({*mine, *theirs}):
-        types = [sorted({c.message_type for c in side.get(topic, ())}) for side in (mine, theirs)]
-        names = [" and ".join(side) or None for side in types]
-        if not all(types):
-            rows.append(_row("channel", topic, *names))
-            continue
-        if types[0] != types[1]:
-            rows.append(_row("type", topic, *names))
-        elif _undecided((*mine[topic], *theirs[topic])):
-            rows.append(_row("definition", topic, *(_digest(side[topic]) for side in (mine, theirs))))
+        rows += _description_rows(topic, mine.get(topic, ()), theirs.get(topic, ()))
         number = counts[0].get(topic), counts[1].get(topic)
-        if number[0] != number[1]:
+        if topic in mine and topic in theirs and number[0] != number[1]:
             rows.append(_row("messages", topic, *number))
-    rows += [
-        _row("metadata", row["key"], row["baseline"], row["candidate"])
-        for row in rows_of(*(_other_metadata(recording) for recording in (baseline, candidate)))
-    ]
-    rows += [
-        _row("attachment", row["key"], row["baseline"], row["candidate"])
-        for row in rows_of(*(_attachments(recording) for recording in (baseline, candidate)))
-    ]
+    beside = {
+        "metadata": rows_of(_other_metadata(baseline), _other_metadata(candidate)),
+        "attachment": rows_of(_attachments(baseline), _attachments(candidate)),
+    }
+    rows += [_row(what, row["key"], row["baseline"], row["candidate"]) for what in beside for row in beside[what]]
     return rows
 
 
-def by_topic(recording: Recording) -> dict[str, tuple[Connection, ...]]:
+def _description_rows(topic: str, baseline: Connections, candidate: Connections) -> list[StructureRow]:
+    """How a topic's connections differ, before any of its messages is read."""
+    types = [sorted({connection.message_type for connection in side}) for side in (baseline, candidate)]
+    names = [" and ".join(side) or None for side in types]
+    if not all(types):
+        return [_row("channel", topic, *names)]
+    if types[0] != types[1]:
+        return [_row("type", topic, *names)]
+    if _undecided((*baseline, *candidate)):
+        return [_row("definition", topic, _digest(baseline), _digest(candidate))]
+    return []
+
+
+def by_topic(recording: Recording) -> dict[str, Connections]:
     """The connections of each topic."""
     return {topic: recording.connections(topic) for topic in {entry.connection.topic for entry in recording.channels}}
 
 
-def _row(what: str, name: str, baseline: object, candidate: object) -> Row:
+def _row(what: str, name: str, baseline: object, candidate: object) -> StructureRow:
     return {"what": what, "name": name, "baseline": baseline, "candidate": candidate}
 
 
@@ -99,13 +99,13 @@ def _flatten(key: str, value: object, into: dict[str, object]) -> None:
         into[key] = value
 
 
-def _undecided(connections: tuple[Connection, ...]) -> bool:
+def _undecided(connections: Connections) -> bool:
     """Whether connections of one type describe it in different words, and not even with the same meaning."""
     texts = {(connection.schema, connection.schema_encoding, connection.message_encoding) for connection in connections}
     return len(texts) > 1 and shared_layout(connections) is None
 
 
-def _digest(connections: tuple[Connection, ...]) -> str:
+def _digest(connections: Connections) -> str:
     texts = sorted(connection.schema for connection in connections)
     return hashlib.sha256(b"".join(texts)).hexdigest()[:16]
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -201,7 +200,7 @@ def _with_results(table: Table) -> tuple[Fields, dict[str, Column]]:
     return Fields({**own.columns, **first, "others": others, **columns}, (*own.counted, "others")), first
 
 
-def _filler(column: Column, rows: int) -> NDArray[Any]:
+def _filler(column: Column, rows: int) -> NDArray[np.object_] | Array:
     if column.kind is Kind.TEXT:
         return np.full((rows, column.values.shape[1]), b"", dtype=object)
     return np.full((rows, column.values.shape[1]), np.nan)

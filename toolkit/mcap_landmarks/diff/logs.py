@@ -81,17 +81,29 @@ class Topic:
         """Compare what has its partner, give up what is older than `until_ns`; the bytes that are still held."""
         mine, theirs = self.waiting
         pairs = pair_keys([held.key_ns for held in mine], [held.key_ns for held in theirs])
-        both = [(mine[i], theirs[j]) for i, j in zip(pairs.baseline.tolist(), pairs.candidate.tolist(), strict=True)]
-        for sides_read, _ in self._batches([a for a, b in both if a == b]):
-            self.diff.equal(sides_read[0])
-        for sides_read, times in self._batches([a for a, b in both if a != b], [b for a, b in both if a != b]):
-            self.diff.pair(sides_read[0], sides_read[1], times)
-        for side, waiting, rows in (("removed", mine, pairs.removed), ("added", theirs, pairs.added)):
-            left = [waiting[row] for row in rows.tolist()]
-            for sides_read, times in self._batches([held for held in left if held.log_time_ns < until_ns]):
-                self.diff.only(side, sides_read[0], times)
-            waiting[:] = [held for held in left if held.log_time_ns >= until_ns]
+        paired = zip(pairs.baseline.tolist(), pairs.candidate.tolist(), strict=True)
+        self._compare_partners([(mine[i], theirs[j]) for i, j in paired])
+        mine[:], theirs[:] = (
+            [mine[row] for row in pairs.removed.tolist()],
+            [theirs[row] for row in pairs.added.tolist()],
+        )
+        self._give_up("removed", mine, until_ns)
+        self._give_up("added", theirs, until_ns)
         return sum(len(held.data) for waiting in self.waiting for held in waiting)
+
+    def _compare_partners(self, partners: Sequence[tuple[_Held, _Held]]) -> None:
+        """Compare messages that belong together; those with the same bytes are read once."""
+        for sides_read, _ in self._batches([mine for mine, theirs in partners if mine == theirs]):
+            self.diff.equal(sides_read[0])
+        others = [(mine, theirs) for mine, theirs in partners if mine != theirs]
+        for sides_read, times in self._batches([mine for mine, _ in others], [theirs for _, theirs in others]):
+            self.diff.pair(sides_read[0], sides_read[1], times)
+
+    def _give_up(self, side: str, waiting: list[_Held], until_ns: int) -> None:
+        """Count messages that are too old to meet a partner any more as `removed` or `added`."""
+        for sides_read, times in self._batches([held for held in waiting if held.log_time_ns < until_ns]):
+            self.diff.only(side, sides_read[0], times)
+        waiting[:] = [held for held in waiting if held.log_time_ns >= until_ns]
 
     def _batches(self, *sides: Sequence[_Held]) -> Iterator[tuple[list[ComparedMessages], Rows]]:
         """Messages that belong together, side by side, and their times; those that cannot be read are seen as bytes."""

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.diff.channel import ChannelDiff
-from mcap_landmarks.diff.declared import Row, rows_of
+from mcap_landmarks.diff.declared import rows_of
+from mcap_landmarks.diff.document import ManifestRow
 from mcap_landmarks.diff.fields import Batch, Fields, texts
 from mcap_landmarks.diff.pairs import Pairs, pair_keys, pair_points
 from mcap_landmarks.diff.tally import Tally
@@ -34,7 +34,7 @@ FIELDS = {
 class MapDiff:
     """What differs between two maps; `baseline_from_candidate` (3,) is the alignment, None without one."""
 
-    manifest: list[Row]
+    manifest: list[ManifestRow]
     landmarks: ChannelDiff
     groups: ChannelDiff
     baseline_from_candidate: Array | None = None
@@ -156,5 +156,5 @@ def _labels(found: Sequence[str]) -> NDArray[np.object_]:
     return texts([text.encode() for text in found])
 
 
-def _numbers(values: NDArray[Any]) -> Column:
+def _numbers(values: NDArray[np.number]) -> Column:
     return Column(Kind.NUMBER, values)

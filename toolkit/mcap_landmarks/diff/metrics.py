@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
+from mcap_landmarks.diff.document import MetricEntry
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.evaluation.metrics import NOWHERE, Outcome, Reference, evaluate
 from mcap_landmarks.evaluation.read import read_reference, read_run
@@ -25,7 +26,7 @@ def metric_names() -> list[str]:
 
 def metric_rows(
     baseline: Path, candidate: Path, reference: Path | None = None, *, same_recording: bool = False
-) -> tuple[dict[str, dict[str, float | None]], list[str]]:
+) -> tuple[dict[str, MetricEntry], list[str]]:
     """The figures of both by name, and what could not be read; no figures unless both have truth and can be evaluated.
 
     What truth a side lacks it takes from the other, if they are runs of the same recording, else from `reference`.
@@ -45,14 +46,20 @@ def metric_rows(
     losses += [f"{baseline}: {loss}" for loss in lost] + [f"{candidate}: {loss}" for loss in more]
     if any(side.trajectory is None and side.objects is None for side in (truth, other)):
         return {}, losses
-    left, right = (_flat(evaluate(run, side, _PAIRING)) for run, side in ((mine, truth), (theirs, other)))
-    rows = {}
-    for name in {**left, **right}:
-        values = left.get(name), right.get(name)
-        delta = values[1] - values[0] if values[0] is not None and values[1] is not None else None
-        if values != (None, None):
-            rows[name] = {"baseline": values[0], "candidate": values[1], "delta": delta}
-    return rows, losses
+    return _side_by_side(_flat(evaluate(mine, truth, _PAIRING)), _flat(evaluate(theirs, other, _PAIRING))), losses
+
+
+def _side_by_side(
+    baseline: Mapping[str, float | None], candidate: Mapping[str, float | None]
+) -> dict[str, MetricEntry]:
+    """The figures that either side has."""
+    rows: dict[str, MetricEntry] = {}
+    for name in {**baseline, **candidate}:
+        mine, theirs = baseline.get(name), candidate.get(name)
+        delta = theirs - mine if mine is not None and theirs is not None else None
+        if mine is not None or theirs is not None:
+            rows[name] = {"baseline": mine, "candidate": theirs, "delta": delta}
+    return rows
 
 
 def _flat(document: Mapping[str, object], prefix: str = "") -> dict[str, float | None]:

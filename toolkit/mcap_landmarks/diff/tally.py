@@ -3,10 +3,11 @@
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from mcap_landmarks.diff.document import CaseEntry, Counts, FieldEntry
 from mcap_landmarks.diff.fields import Batch
 from mcap_landmarks.diff.values import Array, Flags, Rows, difference, largest_at, shown
 from mcap_landmarks.messages.columns import Column, Kind
@@ -25,10 +26,10 @@ class Case(NamedTuple):
     time_ns: int | None
     item: str
     field: str
-    baseline: Any
-    candidate: Any
+    baseline: object
+    candidate: object
 
-    def document(self) -> dict[str, object]:
+    def document(self) -> CaseEntry:
         """An entry of `worst`; a difference that no number tells is null."""
         return {
             "time_ns": self.time_ns,
@@ -53,7 +54,7 @@ class FieldTally:
     cases: list[Case] = field(default_factory=list)
     transitions: Counter[tuple[str, str]] = field(default_factory=Counter)
 
-    def document(self) -> dict[str, object]:
+    def document(self) -> FieldEntry:
         """An entry of `fields`; a difference that no number tells is null."""
         return {
             "changed": self.changed,
@@ -97,7 +98,7 @@ class Tally:
         """Whether anything is not the same."""
         return bool(self.changed or self.added or self.removed)
 
-    def counts(self) -> dict[str, int]:
+    def counts(self) -> Counts:
         """The counts by name."""
         return {"same": self.same, "changed": self.changed, "added": self.added, "removed": self.removed}
 

@@ -1,7 +1,5 @@
 """How far the values of two columns are apart, row by row."""
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,12 +39,12 @@ def difference(name: str, baseline: Column, candidate: Column, tolerance: Tolera
     """
     a, b = baseline.counts, candidate.counts
     if a is None or b is None:
-        apart, beyond = _elements(name, baseline.kind, baseline.values, candidate.values, tolerance)
+        apart, beyond = _elements(name, baseline, candidate, tolerance)
         return apart.max(axis=1, initial=0.0), np.logical_or.reduce(beyond, axis=1)
     alike = a == b
     rows = np.flatnonzero(alike)
     mine, theirs = of_rows(baseline, rows), of_rows(candidate, rows)
-    apart, beyond = _elements(name, baseline.kind, mine.values, theirs.values, tolerance)
+    apart, beyond = _elements(name, mine, theirs, tolerance)
     row_of = np.repeat(rows, a[rows])
     largest = np.where(alike, 0.0, np.inf)
     np.maximum.at(largest, row_of, apart.max(axis=1, initial=0.0))
@@ -55,8 +53,9 @@ def difference(name: str, baseline: Column, candidate: Column, tolerance: Tolera
     return largest, changed
 
 
-def _elements(name: str, kind: Kind, a: NDArray[Any], b: NDArray[Any], tolerance: Tolerance) -> tuple[Array, Flags]:
-    """Differences (N, k) of values (N, k), and which are beyond the tolerance."""
+def _elements(name: str, baseline: Column, candidate: Column, tolerance: Tolerance) -> tuple[Array, Flags]:
+    """Differences (N, k) of the values (N, k) of both, and which are beyond the tolerance."""
+    kind, a, b = baseline.kind, baseline.values, candidate.values
     if kind is Kind.TEXT or a.shape[1] != b.shape[1]:
         differs = np.not_equal(a, b).astype(np.bool_) if a.shape == b.shape else np.ones((len(a), 1), dtype=np.bool_)
         return np.where(differs, np.inf, 0.0), differs
@@ -86,14 +85,14 @@ def _rotation(a: Array, b: Array) -> Array:
     return np.where(equal, 0.0, np.where(np.isnan(angle), np.inf, angle))
 
 
-def shown(column: Column, row: int) -> Any:  # noqa: ANN401 - any JSON value
+def shown(column: Column, row: int) -> object:
     """The value of one row: a number or text, or a list of them; of a long list its length."""
     values = [_plain(part) for part in _row(column, row)]
     found = values[0] if column.counts is None else values
     return f"{len(found)} values" if isinstance(found, list) and len(found) > _LONG else found
 
 
-def largest_at(baseline: Column, candidate: Column, row: int) -> tuple[str, Any, Any]:
+def largest_at(baseline: Column, candidate: Column, row: int) -> tuple[str, object, object]:
     """Values of both sides to show for a row: whole, or of many numbers the place and values that differ the most."""
     mine, theirs = _row(baseline, row).reshape(-1), _row(candidate, row).reshape(-1)
     if baseline.kind is Kind.TEXT or len(mine) != len(theirs) or len(mine) <= _LONG:
@@ -105,13 +104,13 @@ def largest_at(baseline: Column, candidate: Column, row: int) -> tuple[str, Any,
     return f"[{place}]", mine[place].item(), theirs[place].item()
 
 
-def _row(column: Column, row: int) -> NDArray[Any]:
+def _row(column: Column, row: int) -> NDArray[np.generic]:
     if column.counts is None:
         return column.values[row : row + 1]
     start = int(column.counts[:row].sum())
     return column.values[start : start + int(column.counts[row])]
 
 
-def _plain(values: NDArray[Any]) -> Any:  # noqa: ANN401 - as above
+def _plain(values: NDArray[np.generic]) -> object:
     items = [item.decode(errors="replace") if isinstance(item, bytes) else item for item in values.tolist()]
     return items[0] if len(items) == 1 else items
