@@ -7,7 +7,6 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
-from typing import Any
 
 from mcap_landmarks.errors import ToolkitError
 
@@ -44,12 +43,16 @@ def say(text: str = "") -> None:
 
 def say_json(verb: str, document: Mapping[str, object]) -> None:
     """The one document of `--json` on stdout; figures that are not finite become null, as JSON has none."""
-    print(json.dumps({"schema": f"mcap-landmarks/{verb}/1", **_plain(document)}, indent=2, ensure_ascii=False))
+    print(json.dumps({"schema": f"mcap-landmarks/{verb}/1", **_plain_entries(document)}, indent=2, ensure_ascii=False))
 
 
-def _plain(value: Any) -> Any:  # noqa: ANN401 - any JSON value
+def _plain_entries(entries: Mapping[str, object]) -> dict[str, object]:
+    return {str(key): _plain(item) for key, item in entries.items()}
+
+
+def _plain(value: object) -> object:
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return _plain_entries(value)
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):

@@ -1,8 +1,10 @@
 """Measure a run, a map or the thesis's results against the truth."""
 
+from collections.abc import Callable
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,7 +12,8 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
 
 if TYPE_CHECKING:
-    from mcap_landmarks.evaluation.metrics import Outcome, Pairing, Reference
+    from mcap_landmarks.evaluation.metrics import Evaluation, Outcome, Pairing, Reference
+    from mcap_landmarks.evaluation.pose_metrics import Figures
 
 
 class Association(StrEnum):
@@ -82,8 +85,6 @@ def _check(result: Path, outcome: "Outcome", truth: "Reference") -> None:
 
 
 def _pairing(association: Association, max_gap_s: float) -> "Pairing":
-    from functools import partial
-
     from mcap_landmarks.evaluation.trajectory import interpolated, nearest
 
     if association is Association.NEAREST:
@@ -107,37 +108,36 @@ def _export(outcome: "Outcome", truth: "Reference", pairing: "Pairing", tum: Pat
             stream.write(render_results(results_of(outcome, scored)).encode())
 
 
-def _print(document: dict[str, Any]) -> None:
-    parts = [
-        part
-        for part, wanted in (
-            (_print_counts, document["bundles"] or document["localized"]),
-            (_print_poses, document["scored"]),
-            (_print_map, document["map"]),
-        )
-        if wanted
-    ]
+def _print(document: "Evaluation") -> None:
+    parts: list[Callable[[], None]] = []
+    if document["bundles"] or document["localized"]:
+        parts.append(partial(_print_counts, document))
+    if document["scored"]:
+        parts.append(partial(_print_poses, document))
+    if document["map"]:
+        parts.append(partial(_print_map, document["map"]))
     for i, part in enumerate(parts):
         if i:
             say()
-        part(document)
+        part()
 
 
-def _print_counts(document: dict[str, Any]) -> None:
-    eligible = document["eligible"]
-    rows = [[name, str(document[name] if document[name] is not None else "-"), ""] for name in _COUNTS]
-    whole, name = (document["bundles"], "bundles") if document["statuses"] is None else (eligible, "eligible")
-    rows[2][2] = _percent(document["localized"] / whole if whole else None) + f" of {name}"
+def _print_counts(document: "Evaluation") -> None:
+    bundles, eligible, localized = document["bundles"], document["eligible"], document["localized"]
+    whole, name = (bundles, "bundles") if document["statuses"] is None else (eligible, "eligible")
     false = document["false"]
-    rows.append(["false: over 1 m or 20 degrees", str(false["count"]), _percent(false["share"]) + " of scored"])
+    rows = [
+        ["bundles", str(bundles), ""],
+        ["eligible", str(eligible if eligible is not None else "-"), ""],
+        ["localized", str(localized), f"{_percent(localized / whole if whole else None)} of {name}"],
+        ["scored", str(document["scored"]), ""],
+        ["false: over 1 m or 20 degrees", str(false["count"]), f"{_percent(false['share'])} of scored"],
+    ]
     rows.extend([f"status {name}", str(count), ""] for name, count in (document["statuses"] or {}).items())
     table(["bundles", "count", "share"], rows)
 
 
-_COUNTS = ("bundles", "eligible", "localized", "scored")
-
-
-def _print_poses(document: dict[str, Any]) -> None:
+def _print_poses(document: "Evaluation") -> None:
     position, heading, fit = document["position"], document["heading"], document["alignment"]
     table(
         ["position", "RMSE", "median", "95 %", "max", "in 0.2 m", "in 1 m"],
@@ -174,8 +174,7 @@ def _print_poses(document: dict[str, Any]) -> None:
     table(["figure", "value"], rows)
 
 
-def _print_map(document: dict[str, Any]) -> None:
-    figures = document["map"]
+def _print_map(figures: "Figures") -> None:
     counts = ["landmarks", "reference", "matched", "missing", "spurious"]
     errors = [_metres(figures["rmse_aligned_m"]), _metres(figures["rmse_m"])]
     table(

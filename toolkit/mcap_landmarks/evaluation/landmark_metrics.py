@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from mcap_landmarks.evaluation.alignment import fit, search
+from mcap_landmarks.evaluation.pose_metrics import Figures
 from mcap_landmarks.geometry.se2 import Array, transform_points
 from mcap_landmarks.messages.scene import SceneObjects
 
@@ -16,7 +17,7 @@ _ROUNDS = 20
 """Fit and pairing take turns until nothing changes; this ends them if they run in a circle."""
 
 
-def landmark_figures(estimate: SceneObjects, reference: SceneObjects) -> dict[str, int | float | None]:
+def landmark_figures(estimate: SceneObjects, reference: SceneObjects) -> Figures:
     """The field `map` of an evaluation: counts, and RMSE in metres as it stands and after one SE(2) fit."""
     mine, theirs = associate(estimate, reference)
     src, dst = estimate.positions_xy[mine], reference.positions_xy[theirs]

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import TypedDict
 
 import numpy as np
 
 from mcap_landmarks.evaluation.alignment import fit
 from mcap_landmarks.evaluation.landmark_metrics import landmark_figures
 from mcap_landmarks.evaluation.pose_metrics import (
+    Figures,
     align,
     axis_figures,
     false_figures,
@@ -79,8 +81,26 @@ def score(estimate: Trajectory, reference: Reference, pairing: Pairing, *, align
     return ScoredPoses(rows, poses, covariances, truth, transform)
 
 
-def evaluate(outcome: Outcome, reference: Reference, pairing: Pairing, *, aligned: bool = False) -> dict[str, object]:
-    """The document of `evaluate --json` (schemas/json/evaluate.schema.json).
+class Evaluation(TypedDict):
+    """The document of `evaluate --json`, as schemas/json/evaluate.schema.json describes it."""
+
+    bundles: int
+    eligible: int | None
+    localized: int
+    scored: int
+    statuses: Mapping[str, int] | None
+    false: Figures
+    position: Figures
+    axis: dict[str, Figures]
+    heading: Figures
+    nees: float | None
+    rpe: float | None
+    map: Figures | None
+    alignment: dict[str, float] | None
+
+
+def evaluate(outcome: Outcome, reference: Reference, pairing: Pairing, *, aligned: bool = False) -> Evaluation:
+    """How good a run and its map are.
 
     Figures are over scored poses: those that have a reference; figures and shares of nothing are None.
     """

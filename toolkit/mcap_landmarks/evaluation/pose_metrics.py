@@ -8,6 +8,7 @@ from mcap_landmarks.geometry.se2 import Array, between, rotation, transform_poin
 
 FALSE_M, FALSE_DEG = 1.0, 20.0
 Figures = dict[str, float | None]
+"""Figures by name, None where there is nothing to compute them from."""
 
 
 def align(reference_from_estimate: Array, poses: Array, covariances: Array) -> tuple[Array, Array]:
@@ -29,7 +30,7 @@ def pose_errors(estimate: Array, reference: Array) -> Array:
     return errors
 
 
-def false_figures(errors: Array) -> dict[str, int | float | None]:
+def false_figures(errors: Array) -> Figures:
     """Count and share of poses that are more than 1 m or 20 degrees off."""
     far = np.hypot(errors[:, 0], errors[:, 1]) > FALSE_M
     count = int(np.sum(far | (np.abs(np.degrees(errors[:, 2])) > FALSE_DEG)))
