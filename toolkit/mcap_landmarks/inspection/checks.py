@@ -19,6 +19,8 @@ _GAP_PERIODS = 10
 """A gap is told where it is longer than both a second and so many usual periods."""
 _CLOCKS_APART_NS = 100_000_000
 """Drivers and networks delay messages by less; turning at 1 rad/s, it is 6 degrees already."""
+_CLOCKS = ("odometry", "scan", "image")
+"""The others' clocks are held against that of the first of these that there is."""
 _OTHER_EPOCH_NS = 5 * 10**9
 """Stamps that are so far from log times are of another clock, or of a log that was recorded from a played one."""
 _MANY = 0.9
@@ -53,6 +55,7 @@ def check(found: Survey) -> list[Finding]:
         _clocks,
         _partners,
         _frames,
+        _odometry,
         _cameras,
         _beams,
     )
@@ -122,12 +125,13 @@ def _stamps(found: Survey) -> Iterator[Finding]:
 
 
 def _clocks(found: Survey) -> Iterator[Finding]:
-    sensed = [sensor for sensor in found.sensors if not sensor.topic.startswith(RESULTS)]  # ours have others' stamps
-    delays = {sensor.topic: delay for sensor in sensed if (delay := _delay_ns(sensor)) is not None}
-    references = [sensor.topic for role in ("odometry", "scan", "image") for sensor in found.of(role)]
-    reference = next((topic for topic in references if topic in delays), None)
+    delays = _delays(found)
+    clocks = (sensor.topic for role in _CLOCKS for sensor in found.of(role))
+    reference = next((topic for topic in clocks if topic in delays), None)
+    if reference is None:
+        return
     for topic, delay_ns in delays.items():
-        apart_ns = 0.0 if reference is None else delay_ns - delays[reference]
+        apart_ns = delay_ns - delays[reference]
         if abs(apart_ns) > _CLOCKS_APART_NS:
             level = "problem" if abs(apart_ns) > WINDOW_NS else "warning"
             text = f"against log times its stamps are {_span(apart_ns)} those of {reference}"
@@ -135,6 +139,12 @@ def _clocks(found: Survey) -> Iterator[Finding]:
                 "synchronise the clocks (chrony, PTP) or let one machine stamp both; what moves is misplaced by so much"
             )
             yield Finding(level, "clock", topic, text, remedy)
+
+
+def _delays(found: Survey) -> dict[str, float]:
+    """The delays in nanoseconds of the sensors' topics that tell one; our results have the stamps of others."""
+    sensed = [sensor for sensor in found.sensors if not sensor.topic.startswith(RESULTS)]
+    return {sensor.topic: delay for sensor in sensed if (delay := _delay_ns(sensor)) is not None}
 
 
 def _delay_ns(sensor: Sensor) -> float | None:
@@ -189,22 +199,34 @@ def _share_near(moments: NDArray[np.int64], others: NDArray[np.int64], widest_ns
 
 
 def _frames(found: Survey) -> Iterator[Finding]:
-    names = {name for edge in found.edges for name in edge}
-    base = next((name for name in (*_BASES, *sorted(found.bases)) if name in names), None)
+    base = _base(found)
     scans = [sensor for sensor in found.of("scan") if sensor.frame]
     if base is None and scans:
         base = scans[0].frame
-        if found.edges or base in _BASES:
-            text = f"no transforms lead from {base} to a base frame: the robot is taken to be where the LiDAR is"
-            yield Finding("warning", "frames", scans[0].topic, text, REMEDY)
-        else:
-            text = f"there are no transforms: nothing says where the LiDAR ({base}) sits on the robot"
-            yield Finding("problem", "frames", scans[0].topic, text, REMEDY)
-    reached = connected(found.edges, base or _BASES[0])
+        yield _without_base(found, scans[0])
+    base = base or _BASES[0]
+    reached = connected(found.edges, base)
     for sensor in (*(found.of("camera_info") or found.of("image")), *scans):
         if sensor.frame and sensor.frame not in reached:
-            text = f"no transforms lead from {sensor.frame} to {base or _BASES[0]}"
+            text = f"no transforms lead from {sensor.frame} to {base}"
             yield Finding("problem", "frames", sensor.topic, text, REMEDY)
+
+
+def _base(found: Survey) -> str | None:
+    """The robot's own frame, if transforms name one."""
+    names = {name for edge in found.edges for name in edge}
+    return next((name for name in (*_BASES, *sorted(found.bases)) if name in names), None)
+
+
+def _without_base(found: Survey, scan: Sensor) -> Finding:
+    if found.edges or scan.frame in _BASES:
+        text = f"no transforms lead from {scan.frame} to a base frame: the robot is taken to be where the LiDAR is"
+        return Finding("warning", "frames", scan.topic, text, REMEDY)
+    text = f"there are no transforms: nothing says where the LiDAR ({scan.frame}) sits on the robot"
+    return Finding("problem", "frames", scan.topic, text, REMEDY)
+
+
+def _odometry(found: Survey) -> Iterator[Finding]:
     if not found.of("odometry"):
         text = "there is no odometry: no map can be built, and localize takes every bundle alone"
         yield Finding("warning", "frames", "", text, "record it, or name a topic with --odom (poses and /tf do too)")

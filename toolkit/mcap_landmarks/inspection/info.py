@@ -90,28 +90,17 @@ def _profile(log: OpenLog) -> str:
 
 
 def _describe(log: OpenLog, profile: str, parts: Sequence[Log | Recording], losses: Sequence[str]) -> LogInfo:
-    counts: Counter[tuple[str, str]] = Counter()
-    for part in parts:
-        for entry in part.channels:
-            counts[entry.connection.topic, entry.connection.message_type] += entry.count
+    counts = _counts(parts)
     seconds = (log.end_ns - log.start_ns) * 1e-9 if log.start_ns is not None and log.end_ns is not None else 0.0
     roles = _roles([key for key, count in counts.items() if count])
-    role_of = {topic: role for role, topics in roles.items() for topic in topics}
-    channels = tuple(
-        ChannelInfo(topic, kind, count, count / seconds if seconds > 0 and count > 1 else None, role_of.get(topic))
-        for (topic, kind), count in sorted(counts.items())
-    )
-    makeable = {"scene_objects"} if all(roles.get(role) for role in _SOURCES) else set()
-    missing = {
-        verb: [role for role in needs if not roles.get(role) and role not in makeable] for verb, needs in NEEDS.items()
-    }
+    missing = _missing(roles)
     return LogInfo(
         log.path,
         log.name,
         profile,
         log.start_ns,
         log.end_ns,
-        channels,
+        _channels(counts, seconds, roles),
         {role: topics for role, topics in roles.items() if role != RESULTS},
         tuple(verb for verb, lacks in missing.items() if not lacks),
         {verb: lacks for verb, lacks in missing.items() if lacks},
@@ -119,10 +108,38 @@ def _describe(log: OpenLog, profile: str, parts: Sequence[Log | Recording], loss
     )
 
 
+def _counts(parts: Sequence[Log | Recording]) -> Counter[tuple[str, str]]:
+    """The number of messages by topic and type."""
+    counts: Counter[tuple[str, str]] = Counter()
+    for part in parts:
+        for entry in part.channels:
+            counts[entry.connection.topic, entry.connection.message_type] += entry.count
+    return counts
+
+
+def _channels(
+    counts: Mapping[tuple[str, str], int], seconds: float, roles: Mapping[str, Sequence[str]]
+) -> tuple[ChannelInfo, ...]:
+    role_of = {topic: role for role, topics in roles.items() for topic in topics}
+    found = []
+    for (topic, ros_type), count in sorted(counts.items()):
+        rate_hz = count / seconds if seconds > 0 and count > 1 else None
+        found.append(ChannelInfo(topic, ros_type, count, rate_hz, role_of.get(topic)))
+    return tuple(found)
+
+
+def _missing(roles: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    """The roles that each verb lacks."""
+    there = {role for role, topics in roles.items() if topics}
+    if there.issuperset(_SOURCES):
+        there.add("scene_objects")
+    return {verb: [role for role in needs if role not in there] for verb, needs in NEEDS.items()}
+
+
 def _roles(present: Collection[tuple[str, str]]) -> dict[str, list[str]]:
     """Topics by role; truth and results go by their names, everything else by message type."""
     named = {topic for topics in _BY_TOPIC.values() for topic in topics}
-    others = [(topic, kind) for topic, kind in present if topic not in named]
+    others = [(topic, ros_type) for topic, ros_type in present if topic not in named]
     roles = {role.name: topics_for(role, others) for role in ROLES.values() if role.messages}
     topics = {topic for topic, _ in present}
     return roles | {name: [topic for topic in known if topic in topics] for name, known in _BY_TOPIC.items()}

@@ -3,7 +3,7 @@
 import struct
 from array import array
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -87,16 +87,8 @@ def survey(log: OpenLog, roles: Mapping[str, Sequence[str]], progress: Progress 
     found = Survey()
     sensors = {topic: Sensor(role, topic) for role in SENSORS for topic in roles.get(role, ())}
     found.sensors = list(sensors.values())
-    entries = [entry for part in log.parts for entry in part.channels]
-    scans = Counter[str]()
-    for entry in entries:
-        scans[entry.connection.topic] += entry.count
-    strides = {topic: -(-count // _MOST_SCANS) for topic, count in scans.items()}
-    wanted = [
-        entry.connection
-        for entry in entries
-        if entry.connection.topic in sensors or entry.connection.message_type == TFMessage.ROS_TYPE
-    ]
+    strides = _strides(log)
+    wanted = _wanted(log, sensors)
     pieces = [(part.start_ns or 0, partial(part.messages, wanted, None, None, progress)) for part in log.parts]
     transforms = Counter[Connection]()
     for raw in merge(pieces):
@@ -105,10 +97,25 @@ def survey(log: OpenLog, roles: Mapping[str, Sequence[str]], progress: Progress 
             if raw.connection.message_type == TFMessage.ROS_TYPE:
                 _transforms(raw, found, transforms)
             if sensor is not None:
-                _take(raw, sensor, found, max(strides[sensor.topic], 1))
+                _take(raw, sensor, found, strides[sensor.topic])
         except MessageError:
             found.unreadable[raw.connection.topic] += 1
     return found
+
+
+def _wanted(log: OpenLog, sensors: Container[str]) -> list[Connection]:
+    """The connections of the sensors' topics, and of transforms."""
+    connections = (entry.connection for part in log.parts for entry in part.channels)
+    return [one for one in connections if one.topic in sensors or one.message_type == TFMessage.ROS_TYPE]
+
+
+def _strides(log: OpenLog) -> dict[str, int]:
+    """By topic, how many messages there are for each that is decoded."""
+    counts = Counter[str]()
+    for part in log.parts:
+        for entry in part.channels:
+            counts[entry.connection.topic] += entry.count
+    return {topic: max(-(-count // _MOST_SCANS), 1) for topic, count in counts.items()}
 
 
 def _transforms(raw: RawMessage, found: Survey, seen: Counter[Connection]) -> None:
@@ -119,18 +126,18 @@ def _transforms(raw: RawMessage, found: Survey, seen: Counter[Connection]) -> No
 
 
 def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
-    kind, number = raw.connection.message_type, len(sensor.log_ns)
-    stamp_ns = _first_stamp_ns(raw.data) if kind == TFMessage.ROS_TYPE else _stamp_ns(raw.data)
+    ros_type, number = raw.connection.message_type, len(sensor.log_ns)
+    stamp_ns = _first_stamp_ns(raw.data) if ros_type == TFMessage.ROS_TYPE else _stamp_ns(raw.data)
     sensor.log_ns.append(raw.log_time_ns)
     sensor.stamp_ns.append(stamp_ns)
-    if kind == LaserScan.ROS_TYPE and number % stride == 0:
+    if ros_type == LaserScan.ROS_TYPE and number % stride == 0:
         _look_at_scan(decode(LaserScan, raw.data), sensor, found.returns)
-    if number or kind == TFMessage.ROS_TYPE:
+    if number or ros_type == TFMessage.ROS_TYPE:
         return
     sensor.frame = plain(_frame(raw.data))
-    if kind == Odometry.ROS_TYPE:
+    if ros_type == Odometry.ROS_TYPE:
         found.bases.add(plain(decode(Odometry, raw.data).child_frame_id))
-    elif kind == CameraInfo.ROS_TYPE and not decode(CameraInfo, raw.data).intrinsics[0, 0] > 0:
+    elif ros_type == CameraInfo.ROS_TYPE and not decode(CameraInfo, raw.data).intrinsics[0, 0] > 0:
         found.uncalibrated.add(sensor.topic)
 
 

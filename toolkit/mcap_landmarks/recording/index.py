@@ -134,22 +134,30 @@ def _collect(stream: BinaryIO, header: records.Header, section: bytes) -> tuple[
 def _complete(collected: tuple[Index, records.Statistics | None]) -> Index | None:
     """The index, if the statistics confirm that the summary repeats and indexes everything."""
     index, statistics = collected
-    if statistics is None:
+    if statistics is None or not (_has_all(index, statistics) and _has_all_messages(index, statistics)):
         return None
-    counts = statistics.channel_message_counts
-    whole = (
-        statistics.channel_count == len(index.channels)
-        and statistics.chunk_count == len(index.blocks)
-        and statistics.attachment_count == len(index.attachments)
-        and statistics.metadata_count == len(index.metadata)
-        and sum(counts.values()) == statistics.message_count
-        and set(counts) <= set(index.channels)
-        and all(channel.schema_id in index.schemas for channel in index.channels.values() if channel.schema_id)
-        and (statistics.message_count == 0 or bool(index.blocks))
-    )
-    if not whole:
-        return None
-    index.counts = dict(counts)
+    index.counts = dict(statistics.channel_message_counts)
     if statistics.message_count:
         index.start_ns, index.end_ns = statistics.message_start_time, statistics.message_end_time
     return index
+
+
+def _has_all(index: Index, statistics: records.Statistics) -> bool:
+    """Whether everything beside the messages is there that the statistics count, and each channel's schema."""
+    counted = (
+        statistics.channel_count,
+        statistics.chunk_count,
+        statistics.attachment_count,
+        statistics.metadata_count,
+    )
+    schemas = {channel.schema_id for channel in index.channels.values()} - {0}  # 0 stands for none
+    there = (len(index.channels), len(index.blocks), len(index.attachments), len(index.metadata))
+    return counted == there and schemas <= set(index.schemas)
+
+
+def _has_all_messages(index: Index, statistics: records.Statistics) -> bool:
+    """Whether the counts by channel are whole, and what they count lies in a chunk."""
+    counts = statistics.channel_message_counts
+    if sum(counts.values()) != statistics.message_count or not set(counts) <= set(index.channels):
+        return False
+    return statistics.message_count == 0 or bool(index.blocks)

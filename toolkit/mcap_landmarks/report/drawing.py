@@ -63,11 +63,8 @@ def gather(paths: Sequence[Path], *, aligned: bool, progress: Progress | None = 
         drawing = _with(drawing, path.stem, outcome, reference, groups, aligned=aligned)
     if drawing.landmarks is None and drawing.objects is None and not drawing.runs:
         raise RecordingError(f"{paths[0]}: has neither poses nor landmarks to draw; run map or localize first")
-    scored = any(len(run.scored.rows) for run in drawing.runs)
-    if aligned and not scored and drawing.landmarks is not None and drawing.objects is not None:
-        mine, theirs = associate(drawing.landmarks, drawing.objects)
-        src, dst = drawing.landmarks.positions_xy[mine], drawing.objects.positions_xy[theirs]
-        drawing = _moved(drawing, fit(src, dst))
+    if aligned and not any(len(run.scored.rows) for run in drawing.runs):
+        drawing = _onto_objects(drawing)
     return drawing, losses
 
 
@@ -90,6 +87,15 @@ def _with(
             drawing = _moved(drawing, scored.reference_from_estimate)
     run = Run(name, estimate, outcome.continuous, reference.trajectory, scored)
     return replace(drawing, runs=(*drawing.runs, run))
+
+
+def _onto_objects(drawing: Drawing) -> Drawing:
+    """The drawing with its landmarks moved onto the objects of the truth, if it has both."""
+    landmarks, objects = drawing.landmarks, drawing.objects
+    if landmarks is None or objects is None:
+        return drawing
+    mine, theirs = associate(landmarks, objects)
+    return _moved(drawing, fit(landmarks.positions_xy[mine], objects.positions_xy[theirs]))
 
 
 def _moved(drawing: Drawing, reference_from_map: Array) -> Drawing:
