@@ -4,10 +4,12 @@ import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
+from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import DONE, PARTIAL, UNUSABLE, progress, say, say_json, table, warn
@@ -25,6 +27,18 @@ _SUFFIX = {
 _ONE_FILE = {"map": ("--map",), "evaluate": ("--tum", "--thesis")}
 _DETECTS = ("detect", "map", "localize", "run")
 _CALL = (sys.executable, "-c", "from mcap_landmarks.cli.main import run; run()")
+
+
+class _Report(TypedDict):
+    """What became of one log; `result` is the verb's own document, None if it failed."""
+
+    log: str
+    output: str | None
+    outcome: str
+    exit_code: int
+    errors: list[str]
+    notes: list[str]
+    result: object
 
 
 def command(
@@ -88,17 +102,21 @@ def _tasks(verb: str, words: Sequence[str], output: Path) -> "list[Task]":
     return tasks
 
 
-def _command_of(verb: str) -> Any:  # noqa: ANN401 - click's command, which typer does not name
-    from mcap_landmarks.cli.main import build, verbs
+def _command_of(verb: str) -> TyperCommand:
+    from mcap_landmarks.cli.main import build
 
-    if verb not in _SUFFIX or verb not in verbs():
-        raise UsageError(f"batch {verb}: there is no such verb for many logs; choose one of {', '.join(_SUFFIX)}")
-    return typer.main.get_command(build(verb)).commands[verb]  # type: ignore[attr-defined]
+    if verb in _SUFFIX:
+        application = typer.main.get_command(build(verb))
+        own = application.commands.get(verb) if isinstance(application, TyperGroup) else None
+        if isinstance(own, TyperCommand):
+            return own
+    raise UsageError(f"batch {verb}: there is no such verb for many logs; choose one of {', '.join(_SUFFIX)}")
 
 
-def _split(verb: str, own: Any, words: Sequence[str]) -> tuple[list[str], list[str]]:  # noqa: ANN401 - as above
+def _split(verb: str, own: TyperCommand, words: Sequence[str]) -> tuple[list[str], list[str]]:
     """The patterns, and the verb's options with their values."""
-    takes = {name: not option.is_flag for option in own.params for name in option.opts if name.startswith("-")}
+    options = [option for option in own.params if isinstance(option, TyperOption)]
+    takes = {name: not option.is_flag for option in options for name in option.opts}
     patterns, passed = [], []
     rest = iter(words)
     for word in rest:
@@ -112,31 +130,33 @@ def _split(verb: str, own: Any, words: Sequence[str]) -> tuple[list[str], list[s
             raise UsageError(f"{name} names one file, and batch {verb} has many logs; run {verb} without batch for it")
         passed.append(word)
         if takes[name] and not equals:
-            passed.extend(value for value in (next(rest, None),) if value is not None)
+            passed.extend(islice(rest, 1))
     return patterns, passed
 
 
-def _report(verb: str, ended: "Ended") -> dict[str, Any]:
-    """What became of one log."""
+def _report(verb: str, ended: "Ended") -> _Report:
     outcome = {DONE: "done", PARTIAL: "partial"}.get(ended.exit_code, "failed")
+    failed = outcome == "failed"
+    if verb == "evaluate" and not failed:
+        _keep(ended)
     lines = ended.stderr.splitlines()
     errors = [line for line in lines if line.startswith("error: ")]
-    if outcome == "failed" and not errors:
-        how = f"was killed by signal {-ended.exit_code}" if ended.exit_code < 0 else f"ended with {ended.exit_code}"
-        last = f": {lines[-1]}" if lines else ""
-        errors = [f"error: {ended.task.log}: {verb} {how}{last}"]
-    result = None if outcome == "failed" else json.loads(ended.stdout)
-    if verb == "evaluate" and result is not None:
-        _keep(ended)
     return {
         "log": str(ended.task.log),
-        "output": None if outcome == "failed" else str(ended.task.output),
+        "output": None if failed else str(ended.task.output),
         "outcome": outcome,
         "exit_code": ended.exit_code,
-        "errors": errors,
+        "errors": errors or ([_last_words(verb, ended)] if failed else []),
         "notes": [line for line in lines if line.startswith(("note: ", "warning: "))],
-        "result": result,
+        "result": None if failed else json.loads(ended.stdout),
     }
+
+
+def _last_words(verb: str, ended: "Ended") -> str:
+    """An error in place of the one that a process did not give."""
+    how = f"was killed by signal {-ended.exit_code}" if ended.exit_code < 0 else f"ended with {ended.exit_code}"
+    last = f": {ended.stderr.splitlines()[-1]}" if ended.stderr else ""
+    return f"error: {ended.task.log}: {verb} {how}{last}"
 
 
 def _keep(ended: "Ended") -> None:
@@ -146,7 +166,7 @@ def _keep(ended: "Ended") -> None:
         stream.write(ended.stdout.encode())
 
 
-def _print(verb: str, reports: Sequence[Mapping[str, Any]], counts: Mapping[str, int]) -> None:
+def _print(verb: str, reports: Sequence[_Report], counts: Mapping[str, int]) -> None:
     head = list(_FIGURES[verb]) if verb in _FIGURES else []
     rows = []
     for report in reports:
@@ -172,8 +192,8 @@ _FIGURES: dict[str, dict[str, tuple[str, ...]]] = {
 """The columns of a verb's table, and where its document has them."""
 
 
-def _shown(document: Mapping[str, Any], path: Sequence[str]) -> str:
-    value: Any = document
+def _shown(document: object, path: Sequence[str]) -> str:
+    value = document
     for key in path:
         value = value.get(key) if isinstance(value, Mapping) else None
     if value is None:

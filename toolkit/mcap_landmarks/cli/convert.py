@@ -50,9 +50,7 @@ def command(
     if json:
         say_json("convert", _document(conversion))
     else:
-        for done in conversion.outputs:
-            topic_count = len(done.topics)
-            say(f"{done.path}: {done.topics.total()} messages, {topic_count} topic{'s' if topic_count != 1 else ''}")
+        _print(conversion)
     if conversion.failures or any(done.losses or done.lost for done in conversion.outputs):
         raise typer.Exit(PARTIAL)
 
@@ -66,6 +64,12 @@ def _report(done: "Converted") -> None:
         warn(f"warning: {done.path}: {loss}")
     if done.lost:
         warn(f"warning: {done.path}: {done.lost} of {done.declared} declared messages could not be read")
+
+
+def _print(conversion: "Conversion") -> None:
+    for done in conversion.outputs:
+        topics = f"{len(done.topics)} topic{'s' if len(done.topics) != 1 else ''}"
+        say(f"{done.path}: {done.topics.total()} messages, {topics}")
 
 
 def _document(conversion: "Conversion") -> dict[str, object]:

@@ -1,6 +1,8 @@
 """Show what logs hold and which verbs can use them."""
 
 import dataclasses
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -28,14 +30,11 @@ def command(
         documents = [_document(log) for log in logs]
         say_json("info", documents[0] if len(documents) == 1 else {"logs": documents})
     else:
-        for i, log in enumerate(logs):
-            if i:
-                say()
-            _print(log, several=sum(other.path == log.path for other in logs) > 1)
-    for log in logs:
-        for loss in log.losses:
-            warn(f"warning: {loss}")
-    if any(log.losses for log in logs):
+        _print(logs)
+    losses = [loss for log in logs for loss in log.losses]
+    for loss in losses:
+        warn(f"warning: {loss}")
+    if losses:
         raise typer.Exit(PARTIAL)
 
 
@@ -64,15 +63,25 @@ def _document(log: "LogInfo") -> dict[str, object]:
     }
 
 
-def _print(log: "LogInfo", *, several: bool) -> None:
-    say(f"{log.path}: {log.name}" if several else str(log.path))
+def _print(logs: "Sequence[LogInfo]") -> None:
+    several = Counter(log.path for log in logs)
+    for i, log in enumerate(logs):
+        if i:
+            say()
+        say(f"{log.path}: {log.name}" if several[log.path] > 1 else str(log.path))
+        _print_channels(log)
+        _print_verbs(log)
+        _print_findings(log)
+
+
+def _print_channels(log: "LogInfo") -> None:
     count = sum(channel.count for channel in log.channels)
-    kind = f"profile {log.profile}, " if log.profile else ""
+    profile = f"profile {log.profile}, " if log.profile else ""
     if log.start_ns is None or log.end_ns is None:
-        say(f"{kind}no messages")
+        say(f"{profile}no messages")
     else:
         duration = (log.end_ns - log.start_ns) * 1e-9
-        say(f"{kind}{moment(log.start_ns)} to {moment(log.end_ns)}, {duration:.3f} s, {count} messages")
+        say(f"{profile}{moment(log.start_ns)} to {moment(log.end_ns)}, {duration:.3f} s, {count} messages")
     rows = [
         [
             channel.topic,
@@ -84,10 +93,16 @@ def _print(log: "LogInfo", *, several: bool) -> None:
         for channel in log.channels
     ]
     table(["topic", "messages", "Hz", "type", "role"], rows)
+
+
+def _print_verbs(log: "LogInfo") -> None:
     if log.verbs:
         say(f"ready for: {', '.join(log.verbs)}")
     for verb, roles in log.missing.items():
         say(f"{verb} lacks: {', '.join(roles)}")
+
+
+def _print_findings(log: "LogInfo") -> None:
     for finding in log.findings or ():
         about = f"{finding.topic}: " if finding.topic else ""
         say(f"{finding.level}: {about}{finding.text}; {finding.remedy}")

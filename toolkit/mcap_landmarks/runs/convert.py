@@ -105,25 +105,28 @@ def _no_empty_folder(output: Path) -> Iterator[None]:
 
 def _plan(logs: Sequence[OpenLog], output: Path) -> dict[Path, list[OpenLog]]:
     """Which logs go into which file."""
-    paths = {log.path for log in logs}
-    several = len(logs) > len(paths)
-    if several and output.suffix == ".mcap":
-        raise UsageError(f"{output}: the input holds {len(logs)} logs; give -o a folder, without .mcap")
-    if several:
-        make_folder(output)
-        targets = [output / f"{log.name}.mcap" for log in logs]
-        if len(set(targets)) < len(targets):
-            raise UsageError(f"{output}: two inputs would write {targets[-1].name}; convert them into two folders")
-        plan = {target: [log] for target, log in zip(targets, logs, strict=True)}
-    elif output.suffix == ".mcap":
+    several = len(logs) > len({log.path for log in logs})
+    if output.suffix == ".mcap":
+        if several:
+            raise UsageError(f"{output}: the input holds {len(logs)} logs; give -o a folder, without .mcap")
         plan = {next(iter(output_files([output], output).values())): list(logs)}
     else:
-        files = output_files([Path(f"{log.name}.mcap") for log in logs], output)
-        plan = {target: [log] for target, log in zip(files.values(), logs, strict=True)}
+        names = [Path(f"{log.name}.mcap") for log in logs]
+        targets = _in_folder(names, output) if several else list(output_files(names, output).values())
+        plan = {target: [log] for target, log in zip(targets, logs, strict=True)}
     for target in plan:
         if target.exists() and any(target.resolve().is_relative_to(log.path.resolve()) for log in logs):
             raise UsageError(f"{target} is part of the input; write to another file")
     return plan
+
+
+def _in_folder(names: Sequence[Path], folder: Path) -> list[Path]:
+    """One file per log of inputs that hold several."""
+    make_folder(folder)
+    targets = [folder / name for name in names]
+    if len(set(targets)) < len(targets):
+        raise UsageError(f"{folder}: two inputs would write {targets[-1].name}; convert them into two folders")
+    return targets
 
 
 def _patterns(topics: Sequence[str]) -> list[re.Pattern[str]]:

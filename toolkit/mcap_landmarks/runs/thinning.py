@@ -1,6 +1,7 @@
 """Leave out images that come faster, or from nearer to each other, than anyone needs."""
 
 import math
+import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.recording.odometry_buffer import odometry_from
 from mcap_landmarks.stage import Connection, RawMessage
 
+_DISTANCE = re.compile(r"(?P<number>.*)(?P<unit>deg|m)")
 TOO_FAST, TOO_NEAR = "images left out by --image-rate", "images left out by --every"
 
 
@@ -47,23 +49,21 @@ def parse_thinning(rate_hz: float | None, every: str | None) -> Thinning:
         raise UsageError(f"--image-rate {rate_hz:g}: give images per second, above 0")
     given: dict[str, float] = {}
     for part in every.split(",") if every else ():
-        for unit in ("deg", "m"):
-            if part.strip().endswith(unit):
-                given[unit] = _number(part.strip().removesuffix(unit))
-                break
-        else:
-            given[""] = 0.0
-    if not all(unit and value > 0 and math.isfinite(value) for unit, value in given.items()):
-        raise UsageError(f"--every {every}: write metres, degrees or both, above 0, such as 0.2m,5deg")
+        found = _DISTANCE.fullmatch(part.strip())
+        value = _above_zero(found["number"]) if found else None
+        if found is None or value is None:
+            raise UsageError(f"--every {every}: write metres, degrees or both, above 0, such as 0.2m,5deg")
+        given[found["unit"]] = value
     degrees = given.get("deg")
     return Thinning(rate_hz, given.get("m"), None if degrees is None else math.radians(degrees))
 
 
-def _number(text: str) -> float:
+def _above_zero(text: str) -> float | None:
     try:
-        return float(text)
+        value = float(text)
     except ValueError:
-        return 0.0
+        return None
+    return value if value > 0 and math.isfinite(value) else None
 
 
 def thin(
@@ -83,18 +83,24 @@ def thin(
     for raw in raws:
         if motion and raw.connection in odometry:
             motion.follow(raw)
-        if raw.connection in images:
-            if rate and not rate.is_due(raw.log_time_ns):
-                dropped[TOO_FAST] += 1
-                continue
-            if motion and not motion.has_come_far():
-                dropped[TOO_NEAR] += 1
-                continue
-            if rate:
-                rate.take(raw.log_time_ns)
-            if motion:
-                motion.take()
-        yield raw
+        reason = _take(raw.log_time_ns, rate, motion) if raw.connection in images else None
+        if reason is None:
+            yield raw
+        else:
+            dropped[reason] += 1
+
+
+def _take(time_ns: int, rate: "_Rate | None", motion: "_Motion | None") -> str | None:
+    """Take an image, or say why not."""
+    if rate and not rate.is_due(time_ns):
+        return TOO_FAST
+    if motion and not motion.has_come_far():
+        return TOO_NEAR
+    if rate:
+        rate.take(time_ns)
+    if motion:
+        motion.take()
+    return None
 
 
 class _Rate:
