@@ -4,7 +4,6 @@ import json
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -93,7 +92,7 @@ def read_extrinsics(path: Path) -> list[Edge]:
     return [_edge(path, number, entry) for number, entry in enumerate(entries, 1)]
 
 
-def _edge(path: Path, number: int, entry: Any) -> Edge:  # noqa: ANN401 - whatever the file holds
+def _edge(path: Path, number: int, entry: object) -> Edge:
     where = f"{path}: transform {number}"
     known = {"parent", "child", "xyz", "rpy", "quaternion"}
     if not isinstance(entry, Mapping) or not {"parent", "child", "xyz"} <= {*entry} <= known:
@@ -108,9 +107,9 @@ def _edge(path: Path, number: int, entry: Any) -> Edge:  # noqa: ANN401 - whatev
     return str(entry["parent"]), str(entry["child"]), rigid(xyz, turned)
 
 
-def _numbers(where: str, entry: Mapping[str, Any], key: str, count: int) -> Array:
+def _numbers(where: str, entry: Mapping[str, object], key: str, count: int) -> Array:
     values = entry.get(key, [0.0] * count)
-    fits = isinstance(values, list) and len(values) == count
-    if not fits or not all(isinstance(value, int | float) and np.isfinite(value) for value in values):
+    numbers = values if isinstance(values, list) and len(values) == count else [None]
+    if not all(isinstance(value, int | float) and np.isfinite(value) for value in numbers):
         raise UsageError(f"{where}: {key} = {values!r}; give {count} numbers")
-    return np.array(values, dtype=np.float64)
+    return np.array(numbers, dtype=np.float64)

@@ -1,7 +1,7 @@
 """Landmark maps as JSON, with everything that the database holds (schemas/json/landmarks.schema.json)."""
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
@@ -68,22 +68,26 @@ def parse(text: str, name: str) -> LandmarkMap:
         first = error.errors(include_url=False)[0]
         place = ".".join(str(part) for part in first["loc"]) or "document"
         raise MapError(f"{name}, {place}: {first['msg']}") from error
-    rows = document.landmarks
     try:
-        return LandmarkMap(
-            tuple(row.id for row in rows),
-            tuple(row.class_name for row in rows),
-            np.array([(row.x_m, row.y_m) for row in rows]),
-            np.array([row.covariance_m2 for row in rows]),
-            np.array([row.radius_m for row in rows]),
-            np.array([row.sightings for row in rows], dtype=np.int64),
-            np.array([row.tentative for row in rows], dtype=np.bool_),
-            tuple(_group(row) for row in document.groups),
-            tuple(Source(row.kind, row.fingerprint, row.bundles, row.used) for row in document.sources),
-            document.frame,
-        )
+        return _landmark_map(document)
     except MapError as error:
         raise MapError(f"{name}: {error}") from error
+
+
+def _landmark_map(document: _Document) -> LandmarkMap:
+    rows = document.landmarks
+    return LandmarkMap(
+        tuple(row.id for row in rows),
+        tuple(row.class_name for row in rows),
+        np.array([(row.x_m, row.y_m) for row in rows]),
+        np.array([row.covariance_m2 for row in rows]),
+        np.array([row.radius_m for row in rows]),
+        np.array([row.sightings for row in rows], dtype=np.int64),
+        np.array([row.tentative for row in rows], dtype=np.bool_),
+        tuple(_group(row) for row in document.groups),
+        tuple(Source(row.kind, row.fingerprint, row.bundles, row.used) for row in document.sources),
+        document.frame,
+    )
 
 
 def _group(row: _Group) -> Group:
@@ -91,7 +95,7 @@ def _group(row: _Group) -> Group:
     return Group(tuple(row.landmark_ids), np.array([row.x_m, row.y_m, row.heading_rad]), covariance)
 
 
-def document(landmark_map: LandmarkMap) -> dict[str, Any]:
+def document(landmark_map: LandmarkMap) -> dict[str, object]:
     """The map as a JSON document, numbers to the last bit."""
     landmarks = [
         {

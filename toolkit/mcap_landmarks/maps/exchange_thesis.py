@@ -4,9 +4,9 @@ import ast
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,8 +14,12 @@ from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.maps.model import Group, LandmarkMap, Source
 
+T = TypeVar("T")
+
 _NUMBER = re.compile(r"\s*\d+\s+(?=\[)")
 _GROUP = "[['class', x, y], ..., ['robot', x, y, heading]]"
+_LARGEST = 1e308
+"""Larger numbers are no coordinates, and infinity or not a number is none either."""
 _RESULT = "[['class', ...], [reference x, y], [estimated x, y]]"
 
 
@@ -38,17 +42,11 @@ def parse_map(text: str, name: str) -> LandmarkMap:
     """
     identities: dict[tuple[str, float, float], str] = {}
     groups = []
-    for row, (line, values) in enumerate(_lists(text, name, _GROUP), start=1):
-        *objects, robot = values if len(values) > 1 else ([], [])
-        if not (_is_object(robot, 3) and robot[0] == "robot" and all(_is_object(item, 2) for item in objects)):
-            raise _malformed(name, line, _GROUP)
-        ids = [
-            identities.setdefault((item[0], float(item[1]), float(item[2])), f"g{row}.{place}")
-            for place, item in enumerate(objects, start=1)
-        ]
+    for row, (line, (objects, pose)) in enumerate(_lines(text, name, _GROUP, _read_group), start=1):
+        ids = [identities.setdefault(item, f"g{row}.{place}") for place, item in enumerate(objects, start=1)]
         if len(set(ids)) != len(ids):
             raise MapError(f"{name}, line {line}: the same object twice; a group has each object once")
-        groups.append(Group(tuple(ids), np.array(robot[1:], dtype=np.float64)))
+        groups.append(Group(tuple(ids), np.array(pose)))
     if not groups:
         raise MapError(f"{name}: holds no group; expected lines like {_GROUP}")
     source = Source("import", hashlib.sha256(text.encode()).hexdigest())
@@ -94,16 +92,11 @@ def parse_results(text: str, name: str) -> Results:
     Raises:
         MapError: with the name of the file, the line, and what was expected there.
     """
-    classes, positions = [], []
-    for line, values in _lists(text, name, _RESULT):
-        if not (len(values) == 3 and _are_names(values[0]) and all(_are_numbers(pair, 2) for pair in values[1:])):
-            raise _malformed(name, line, _RESULT)
-        classes.append(tuple(values[0]))
-        positions.append(values[1:])
-    if not positions:
+    results = [result for _, result in _lines(text, name, _RESULT, _read_result)]
+    if not results:
         raise MapError(f"{name}: holds no result; expected lines like {_RESULT}")
-    pairs = np.array(positions, dtype=np.float64)
-    return Results(tuple(classes), pairs[:, 0], pairs[:, 1])
+    classes, reference, estimate = zip(*results, strict=True)
+    return Results(classes, np.array(reference), np.array(estimate))
 
 
 def render_results(results: Results) -> str:
@@ -115,42 +108,66 @@ def render_results(results: Results) -> str:
     return _render(rows)
 
 
-def _lists(text: str, name: str, expected: str) -> Iterator[tuple[int, list[Any]]]:
+def _lines(text: str, name: str, expected: str, read: Callable[[object], T]) -> Iterator[tuple[int, T]]:
+    """Number and content of each line that is not empty, as `read` takes it: it raises ValueError for other forms."""
     for line, content in enumerate(text.splitlines(), start=1):
         if not content.strip():
             continue
         try:
-            values = ast.literal_eval(_NUMBER.sub("", content, count=1).strip())
+            found = read(ast.literal_eval(_NUMBER.sub("", content, count=1).strip()))
         except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError) as error:
-            raise _malformed(name, line, expected) from error
-        if not isinstance(values, list):
-            raise _malformed(name, line, expected)
-        yield line, values
+            raise MapError(f"{name}, line {line}: expected {expected}") from error
+        yield line, found
 
 
-def _malformed(name: str, line: int, expected: str) -> MapError:
-    return MapError(f"{name}, line {line}: expected {expected}")
+def _read_group(values: object) -> tuple[list[tuple[str, float, float]], list[float]]:
+    """The objects of a group, and the robot's pose."""
+    *items, last = _list(values)
+    robot, pose = _read_item(last, 3)
+    if robot != "robot" or not items:
+        raise ValueError("a group is objects and a robot")
+    objects = [_read_item(item, 2) for item in items]
+    return [(class_name, x, y) for class_name, (x, y) in objects], pose
 
 
-def _is_object(item: object, numbers: int) -> bool:
-    return isinstance(item, list) and _are_names(item[:1]) and _are_numbers(item[1:], numbers)
+def _read_result(values: object) -> tuple[tuple[str, ...], list[float], list[float]]:
+    """Classes, true position and computed position."""
+    classes, reference, estimate = _list(values)
+    names = tuple(_name(item) for item in _list(classes))
+    if not names:
+        raise ValueError("a result is of objects")
+    return names, _numbers(_list(reference), 2), _numbers(_list(estimate), 2)
 
 
-def _are_names(items: object) -> bool:
-    return isinstance(items, list) and bool(items) and all(isinstance(item, str) and item for item in items)
+def _read_item(values: object, count: int) -> tuple[str, list[float]]:
+    """Name and numbers of `['name', number, ...]`."""
+    first, *numbers = _list(values)
+    return _name(first), _numbers(numbers, count)
 
 
-def _are_numbers(items: object, count: int) -> bool:
-    return (
-        isinstance(items, list)
-        and len(items) == count
-        and all(isinstance(item, int | float) and not isinstance(item, bool) and abs(item) <= 1e308 for item in items)
-    )
+def _list(values: object) -> list[object]:
+    if not isinstance(values, list):
+        raise TypeError("not a list")
+    return values
+
+
+def _name(value: object) -> str:
+    if not isinstance(value, str) or not value:
+        raise ValueError("not a name")
+    return value
+
+
+def _numbers(values: list[object], count: int) -> list[float]:
+    found = [value for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
+    numbers = [float(value) for value in found if abs(value) <= _LARGEST]
+    if not len(numbers) == len(values) == count:
+        raise ValueError(f"not {count} numbers")
+    return numbers
 
 
 def _rounded(values: Array) -> list[float]:
     return [round(value, 4) + 0.0 for value in values.tolist()]  # + 0.0 makes -0.0 plain
 
 
-def _render(rows: list[list[Any]]) -> str:
+def _render(rows: Sequence[object]) -> str:
     return "".join(f"{number} {row}\n" for number, row in enumerate(rows, start=1))

@@ -45,10 +45,10 @@ class DataSet:
         """Numbers of the robots that have a file."""
         return sorted({int(match[1]) for name in self._names if (match := _ROBOT.fullmatch(name))})
 
-    def table(self, robot: int, kind: str) -> Table | None:
+    def table(self, robot: int, content: str) -> Table | None:
         """A robot's `Odometry`, `Measurement` or `Groundtruth`, None if there is no such file."""
-        name = f"Robot{robot}_{kind}.dat"
-        return _timed(name, self._read(name), _COLUMNS[kind]) if name in self._names else None
+        name = f"Robot{robot}_{content}.dat"
+        return _timed(name, self._read(name), _COLUMNS[content]) if name in self._names else None
 
     def numbers(self, name: str, columns: int) -> list[list[float]] | None:
         """Rows of a file without time stamps, None if there is no such file.

@@ -76,25 +76,30 @@ def open_mrclam(path: Path, config: MrclamConfig) -> Iterator[Sequence[SourceLog
 
 
 def _robot(data: DataSet, robot: int, subjects: dict[int, int], config: MrclamConfig) -> SourceLog:
-    tables = {kind: data.table(robot, kind) for kind in ("Odometry", "Measurement", "Groundtruth")}
-    notes = [f"there is no Robot{robot}_{kind}.dat" for kind, table in tables.items() if table is None]
+    make: dict[str, Callable[[Table, str], _Track]] = {
+        "Odometry": lambda table, name: _odometry(table, name, config),
+        "Measurement": lambda table, name: _objects(table, name, subjects, config),
+        "Groundtruth": _truth,
+    }
+    found: list[Table] = []
     tracks: list[_Track] = []
-    if (table := tables["Odometry"]) is not None:
-        tracks.append(_odometry(table, f"Robot{robot}_Odometry.dat", config))
-    if (table := tables["Measurement"]) is not None:
-        tracks.append(_objects(table, f"Robot{robot}_Measurement.dat", subjects, config))
-    if (table := tables["Groundtruth"]) is not None:
-        tracks.append(_truth(table, f"Robot{robot}_Groundtruth.dat"))
-    start = min((int(track.time_ns[0]) for track in tracks if len(track.time_ns)), default=0)
+    notes: list[str] = []
+    for content, make_track in make.items():
+        name = f"Robot{robot}_{content}.dat"
+        if (table := data.table(robot, content)) is None:
+            notes.append(f"there is no {name}")
+        else:
+            found.append(table)
+            tracks.append(make_track(table, name))
     if (landmarks := data.numbers(_LANDMARKS, 5)) is None:
         notes.append(f"there is no {_LANDMARKS}")
     else:
-        tracks.insert(0, _survey(landmarks, start))
-    present = [table for table in tables.values() if table is not None]
-    dropped: Counter[str] = sum((table.dropped for table in present), Counter())
-    losses = tuple(loss for table in present for loss in table.losses)
-    notes += [note for table in present for note in table.notes]
-    size = sum(table.size_bytes for table in present)
+        start_ns = min((int(track.time_ns[0]) for track in tracks if len(track.time_ns)), default=0)
+        tracks.insert(0, _survey(landmarks, start_ns))
+    dropped: Counter[str] = sum((table.dropped for table in found), Counter())
+    losses = tuple(loss for table in found for loss in table.losses)
+    notes += [note for table in found for note in table.notes]
+    size = sum(table.size_bytes for table in found)
     return SourceLog(f"robot{robot}", (RobotLog(tracks),), size, losses, dict(dropped), tuple(notes))
 
 

@@ -3,10 +3,9 @@
 import contextlib
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 import zstandard
 from ruamel.yaml import YAML
@@ -156,6 +155,11 @@ def _folder(path: Path) -> _Folder:
             raise RecordingError(f"{path} holds no storage file (.db3 or .mcap); copy the bag again")
         why = f"{_METADATA} lists no files" if (path / _METADATA).exists() else f"there is no {_METADATA}"
         return _Folder(present, _distribution(about), notes=[f"{path}: {why}; took all {len(present)} storage files"])
+    return _listed_files(path, about, listed, present)
+
+
+def _listed_files(path: Path, about: Mapping[str, object], listed: Sequence[str], present: Sequence[Path]) -> _Folder:
+    """The files of a bag whose metadata list them; none of its files may be there that they do not list."""
     by_name = {file.name.removesuffix(".zstd"): file for file in present}
     missing = [name for name in listed if name.removesuffix(".zstd") not in by_name]
     if len(missing) == len(listed):
@@ -169,7 +173,7 @@ def _folder(path: Path) -> _Folder:
     return _Folder(files, _distribution(about), [f"{path}: {name}, a part of the bag, is missing" for name in missing])
 
 
-def _information(metadata: Path) -> dict[str, Any]:
+def _information(metadata: Path) -> Mapping[str, object]:
     """What a metadata.yaml says, nothing if it is missing or damaged."""
     try:
         document = YAML(typ="safe", pure=True).load(metadata.read_text())
@@ -179,12 +183,12 @@ def _information(metadata: Path) -> dict[str, Any]:
     return about if isinstance(about, dict) else {}
 
 
-def _listed(about: dict[str, Any]) -> list[str]:
+def _listed(about: Mapping[str, object]) -> list[str]:
     names = about.get("relative_file_paths")
     return [PurePosixPath(str(name)).name for name in names] if isinstance(names, list) else []
 
 
-def _distribution(about: dict[str, Any]) -> str | None:
+def _distribution(about: Mapping[str, object]) -> str | None:
     name = str(about.get("ros_distro"))
     return name if known_distribution(name) else None
 
