@@ -5,7 +5,6 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from mcap_landmarks.errors import ToolkitError, UsageError
 from pydantic import ValidationError
@@ -46,9 +45,9 @@ def load_scenario(name: str, settings: Sequence[str] = (), seed: int | None = No
     return LoadedScenario(path.stem, scenario if seed is None else replace(scenario, seed=seed), origins)
 
 
-def effective(scenario: Scenario) -> dict[str, Any]:
+def effective(scenario: Scenario) -> dict[str, object]:
     """Every value of a scenario under its name in TOML: the scenario made from these is the same."""
-    content: dict[str, Any] = ADAPTER.dump_python(scenario, mode="json", by_alias=True, exclude_none=True)
+    content: dict[str, object] = ADAPTER.dump_python(scenario, mode="json", by_alias=True, exclude_none=True)
     return content
 
 
@@ -63,7 +62,7 @@ def _path(name: str, beside: Path) -> Path:
     raise UsageError(f"{name}: there is no such scenario file, and none of that name is bundled; {hint}")
 
 
-def _read(path: Path, above: tuple[Path, ...]) -> tuple[dict[str, Any], dict[Location, str]]:
+def _read(path: Path, above: tuple[Path, ...]) -> tuple[dict[str, object], dict[Location, str]]:
     """Content of a file over that of the one it extends, and the origin `file:line` of each value."""
     try:
         text = path.read_text()
@@ -84,17 +83,18 @@ def _read(path: Path, above: tuple[Path, ...]) -> tuple[dict[str, Any], dict[Loc
 
 
 def _merge(
-    base: dict[str, Any],
+    base: dict[str, object],
     base_origins: dict[Location, str],
-    content: Mapping[str, Any],
+    content: Mapping[str, object],
     origins: Mapping[Location, str],
     inside: Location,
-) -> dict[str, Any]:
+) -> dict[str, object]:
     """`base` with `content` over it: tables are joined, all else is replaced; the origins in place."""
     for key, value in content.items():
         location = (*inside, key)
-        if isinstance(value, dict) and isinstance(base.get(key), dict):
-            _merge(base[key], base_origins, value, origins, location)
+        below = base.get(key)
+        if isinstance(value, dict) and isinstance(below, dict):
+            _merge(below, base_origins, value, origins, location)
             continue
         base[key] = value
         for old in [place for place in base_origins if place[: len(location)] == location]:
@@ -103,7 +103,7 @@ def _merge(
     return base
 
 
-def _set(content: dict[str, Any], origins: dict[Location, str], text: str) -> None:
+def _set(content: dict[str, object], origins: dict[Location, str], text: str) -> None:
     name, equals, value = text.partition("=")
     keys = name.split(".")
     if not equals or not all(keys):
@@ -112,7 +112,7 @@ def _set(content: dict[str, Any], origins: dict[Location, str], text: str) -> No
         parsed = tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:
         parsed = value
-    change: dict[str, Any] = {keys[-1]: parsed}
+    change: dict[str, object] = {keys[-1]: parsed}
     for key in reversed(keys[:-1]):
         change = {key: change}
     _merge(content, origins, change, {tuple(keys): f"--set {text}"}, ())

@@ -5,7 +5,7 @@ The names, units and defaults here are those of the TOML files; `schemas/json/sc
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -210,7 +210,7 @@ class Scenario:
 ADAPTER: TypeAdapter[Scenario] = TypeAdapter(Scenario)
 
 
-def json_schema() -> dict[str, Any]:
+def json_schema() -> dict[str, object]:
     """JSON schema of a scenario's TOML file."""
     schema = ADAPTER.json_schema()
     schema["properties"]["extends"] = {

@@ -1,13 +1,14 @@
 """Make the detector that the package carries: render pictures, train YOLOv5n on them, judge it, export it."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import torch
 import typer
+from numpy.typing import NDArray
 
 from mcap_landmarks_generator.assets import catalog
 from mcap_landmarks_generator.assets.catalog import COCO_ID
@@ -15,6 +16,7 @@ from mcap_landmarks_generator.training import export as onnx_export
 from mcap_landmarks_generator.training import fitting, worlds
 from mcap_landmarks_generator.training.examples import Examples, Phase
 from mcap_landmarks_generator.training.judging import detect
+from mcap_landmarks_generator.training.network import Network
 from mcap_landmarks_generator.training.pictures import Picture, PictureSet, make, render
 from mcap_landmarks_generator.training.scoring import Scored, joined, score
 from mcap_landmarks_generator.training.worlds import THESIS_CLASSES, Kind, scene
@@ -90,25 +92,35 @@ def judge(
 ) -> None:
     """Judge the averaged network on worlds kept for development, by score threshold and distance."""
     trained = fitting.trained(run / fitting.LAST, torch.device(device))
-    results: dict[str, dict[int, Scored]] = {}
-    for kind in ("thesis", "twelve", "empty"):
-        shown = list(_developed(kind, count))
-        found = detect(trained.network, [picture.image for picture in shown])
-        labels = [picture.labels for picture in shown]
-        results[kind] = {coco_id: score(found, labels, coco_id) for coco_id in COCO_ID.values()}
-        if kind == "empty":
-            best = np.array([one.scores.max(initial=0.0) for one in found])
+    thesis, twelve = _scored(trained.network, "thesis", count), _scored(trained.network, "twelve", count)
+    empty = detect(trained.network, [picture.image for picture in _developed("empty", count)])
     typer.echo(f"step {trained.step}")
-    for kind in ("thesis", "twelve"):
-        names = THESIS_CLASSES if kind == "thesis" else tuple(COCO_ID)
-        values = {name: results[kind][COCO_ID[name]].average_precision() for name in names}
-        each = " ".join(f"{name} {value:.3f}" for name, value in values.items())
-        typer.echo(f"{kind}: mAP50 {np.mean(list(values.values())):.4f} ({each})")
-    thesis = joined([results["thesis"][COCO_ID[name]] for name in THESIS_CLASSES])
-    wrong = joined(list(results["thesis"].values()))
+    _tell_precisions("thesis", thesis, THESIS_CLASSES)
+    _tell_precisions("twelve", twelve, tuple(COCO_ID))
+    _tell_thresholds(thesis, np.array([one.scores.max(initial=0.0) for one in empty]))
+
+
+def _scored(network: Network, kind: Kind, count: int) -> dict[int, Scored]:
+    """What became of the detections in worlds of one kind, by COCO id."""
+    shown = list(_developed(kind, count))
+    found = detect(network, [picture.image for picture in shown])
+    labels = [picture.labels for picture in shown]
+    return {coco_id: score(found, labels, coco_id) for coco_id in COCO_ID.values()}
+
+
+def _tell_precisions(kind: Kind, scored: dict[int, Scored], classes: Sequence[str]) -> None:
+    values = {name: scored[COCO_ID[name]].average_precision() for name in classes}
+    each = " ".join(f"{name} {value:.3f}" for name, value in values.items())
+    typer.echo(f"{kind}: mAP50 {np.mean(list(values.values())):.4f} ({each})")
+
+
+def _tell_thresholds(scored: dict[int, Scored], best: NDArray[np.float64]) -> None:
+    """Recall by distance, precision, and images (N,) of nothing whose best score is above each threshold."""
+    thesis = joined([scored[COCO_ID[name]] for name in THESIS_CLASSES])
+    everything = joined(list(scored.values()))
     for threshold in np.arange(0.2, 0.75, 0.05):
         recalls = " ".join(f"{thesis.recall(threshold, a, b):.3f}" for a, b in ((2, 8), (8, 12), (12, 15)))
-        precision, false = wrong.precision(threshold), np.mean(best > threshold)
+        precision, false = everything.precision(threshold), np.mean(best > threshold)
         typer.echo(f"at {threshold:.2f}: recall {recalls} precision {precision:.4f} false images {false:.4f}")
 
 

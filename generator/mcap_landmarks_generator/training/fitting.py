@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -79,7 +78,7 @@ def start(recipe: Recipe, device: torch.device, checkpoint: Path | None = None) 
     groups = [{"params": decayed, "weight_decay": recipe.weight_decay}, {"params": others, "weight_decay": 0.0}]
     training = Training(network, average, torch.optim.AdamW(groups, lr=recipe.learning_rate, betas=(0.9, 0.99)))
     if checkpoint is not None:
-        state: dict[str, Any] = torch.load(checkpoint, map_location=device, weights_only=True)
+        state = torch.load(checkpoint, map_location=device, weights_only=True)
         network.load_state_dict(state["network"])
         average.load_state_dict(state["average"])
         training.optimizer.load_state_dict(state["optimizer"])
@@ -99,7 +98,7 @@ class Trained:
 
 def trained(checkpoint: Path, device: torch.device) -> Trained:
     """What a checkpoint holds, ready to detect."""
-    state: dict[str, Any] = torch.load(checkpoint, map_location=device, weights_only=True)
+    state = torch.load(checkpoint, map_location=device, weights_only=True)
     network = Network("n", len(CLASS_IDS)).to(device)
     network.load_state_dict(state["average"])
     phases = tuple(Phase(**phase) for phase in state["recipe"].pop("phases"))
@@ -153,7 +152,7 @@ def fit(
             sums = [0.0, 0.0, 0.0]
 
 
-def _as_it_is(batch: Any) -> Any:  # noqa: ANN401 - as the loader declares it
+def _as_it_is(batch: object) -> object:
     return batch
 
 
