@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 from mcap_landmarks import __version__
 from mcap_landmarks.errors import ToolkitError
@@ -26,6 +26,17 @@ RECORDING = "recording"
 """What a stage's inputs call the recording itself."""
 
 
+class OutcomeEntry(TypedDict):
+    """An `Outcome` as JSON values."""
+
+    bundles: int
+    unreadable: int
+    counts: dict[str, int]
+    dropped: dict[str, int]
+    losses: list[str]
+    notes: list[str]
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What a stage did: bundles, those that could not be read, its results by kind, and what was left out or lost."""
@@ -37,7 +48,7 @@ class Outcome:
     losses: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
-    def entry(self) -> dict[str, object]:
+    def entry(self) -> OutcomeEntry:
         """The outcome as JSON values."""
         return {
             "bundles": self.bundles,
@@ -49,9 +60,12 @@ class Outcome:
         }
 
     @classmethod
-    def of(cls, entry: Mapping[str, Any]) -> "Outcome":
+    def of(cls, entry: OutcomeEntry) -> "Outcome":
         """The outcome that `entry` made JSON values of."""
-        return cls(**{**entry, "losses": tuple(entry["losses"]), "notes": tuple(entry["notes"])})
+        counts, dropped = entry["counts"], entry["dropped"]
+        return cls(
+            entry["bundles"], entry["unreadable"], counts, dropped, tuple(entry["losses"]), tuple(entry["notes"])
+        )
 
 
 @dataclass(frozen=True, slots=True)

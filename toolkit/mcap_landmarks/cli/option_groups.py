@@ -5,12 +5,14 @@ import functools
 import inspect
 from collections.abc import Callable
 from inspect import Parameter
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import TYPE_CHECKING, get_type_hints
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.errors import UsageError
 
 if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
     from mcap_landmarks.runs.thinning import Thinning
 
 
@@ -93,7 +95,7 @@ class ScanOptions:
 def spread(command: Callable[..., None]) -> Callable[..., None]:
     """The same command with every group of options among its parameters spread out, behind the command's own."""
     hints = get_type_hints(command, include_extras=True)
-    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if dataclasses.is_dataclass(hint)}
+    groups = {name: hint for name, hint in hints.items() if isinstance(hint, type) and dataclasses.is_dataclass(hint)}
     parameters = [
         parameter.replace(kind=Parameter.KEYWORD_ONLY, annotation=hints[name])
         for name, parameter in inspect.signature(command).parameters.items()
@@ -102,7 +104,7 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
     parameters += [single for group in groups.values() for single in _single(group)]
 
     @functools.wraps(command)
-    def taking(**given: Any) -> None:  # noqa: ANN401 - what typer read
+    def taking(**given: object) -> None:
         for name, group in groups.items():
             given[name] = group(**{field.name: given.pop(field.name) for field in dataclasses.fields(group)})
         command(**given)
@@ -112,7 +114,7 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
     return taking
 
 
-def _single(group: Any) -> list[Parameter]:  # noqa: ANN401 - a dataclass type
+def _single(group: "type[DataclassInstance]") -> list[Parameter]:
     hints = get_type_hints(group, include_extras=True)
     return [
         Parameter(field.name, Parameter.KEYWORD_ONLY, default=field.default, annotation=hints[field.name])

@@ -4,7 +4,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 import matplotlib as mpl
 import numpy as np
@@ -28,16 +28,6 @@ _RUNS = ("#111827", "#1D4ED8", "#B45309", "#047857", "#7E22CE")
 _RADII_95 = 2.4477
 """An ellipse of so many sigmas holds 95 % of a normal distribution of the plane."""
 _MOST_LABELS = 60
-_STYLE: dict[Any, Any] = {  # matplotlib's own type is a list of several hundred literals
-    "font.size": 9,
-    "axes.edgecolor": "#9CA3AF",
-    "axes.labelcolor": "#374151",
-    "axes.linewidth": 0.8,
-    "xtick.color": "#6B7280",
-    "ytick.color": "#6B7280",
-    "svg.hashsalt": "mcap-landmarks",
-    "savefig.dpi": 200,
-}
 
 
 def form_of(path: Path) -> str:
@@ -58,8 +48,17 @@ def save(draw: Callable[[], Figure], stream: BinaryIO, form: str) -> None:
     with mpl.rc_context(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         mpl.rcdefaults()
-        mpl.rcParams.update(_STYLE)
+        _set_style()
         draw().savefig(stream, format=form, metadata=FORMATS[form], bbox_inches="tight", pad_inches=0.1)
+
+
+def _set_style() -> None:
+    mpl.rc("font", size=9)
+    mpl.rc("axes", edgecolor="#9CA3AF", labelcolor="#374151", linewidth=0.8)
+    mpl.rc("xtick", color="#6B7280")
+    mpl.rc("ytick", color="#6B7280")
+    mpl.rc("svg", hashsalt="mcap-landmarks")
+    mpl.rc("savefig", dpi=200)
 
 
 def figure(drawing: Drawing, title: str = "") -> Figure:
