@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 from mcap_landmarks.evaluation.pose_metrics import Figures, axis_figures, pose_errors, position_figures
-from mcap_landmarks.report.comparison import errors_figure, positions_figure
 from mcap_landmarks.report.drawing import Drawing, gather
+from mcap_landmarks.report.error_plots import errors_figure, positions_figure
 from mcap_landmarks.report.plots import figure, save
 
 from tests.benchmark.rows import Row, main

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from mcap_landmarks.evaluation.metrics import Outcome, Reference, evaluate
+from mcap_landmarks.evaluation.metrics import Reference, RunResult, evaluate
 from mcap_landmarks.evaluation.read import read_reference, read_run
-from mcap_landmarks.evaluation.trajectory import Pairs, Trajectory, nearest
+from mcap_landmarks.evaluation.trajectory import PosePairs, Trajectory, nearest
 from mcap_landmarks.geometry.angles import quaternion_from_yaw
 from mcap_landmarks.geometry.se2 import compose
 from mcap_landmarks.resources import resource
@@ -26,10 +26,10 @@ class Figures(NamedTuple):
 
 
 def ours(estimate: Trajectory, reference: Trajectory, *, aligned: bool, within_ns: int = WITHIN_NS) -> Figures:
-    def pairing(mine: Trajectory, theirs: Trajectory) -> Pairs:
+    def pairing(mine: Trajectory, theirs: Trajectory) -> PosePairs:
         return nearest(mine, theirs, within_ns)
 
-    found = evaluate(Outcome(estimate, len(estimate)), Reference(reference), pairing, aligned=aligned)
+    found = evaluate(RunResult(estimate, len(estimate)), Reference(reference), pairing, aligned=aligned)
     return Figures(found["scored"], found["position"]["rmse_m"], found["rpe"], found["heading"]["rmse_deg"])
 
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from mcap_landmarks.evaluation import pose_metrics
-from mcap_landmarks.evaluation.metrics import Outcome, Reference, evaluate, score
+from mcap_landmarks.evaluation.metrics import Reference, RunResult, evaluate, score
 from mcap_landmarks.evaluation.read import read_run
 from mcap_landmarks.evaluation.trajectory import Trajectory, interpolated
 from mcap_landmarks.geometry.se2 import compose
@@ -26,7 +26,7 @@ def timed(poses: np.ndarray, covariances: np.ndarray | None = None) -> Trajector
 
 
 def figures(estimate: Trajectory, truth: Trajectory, *, aligned: bool = False) -> dict[str, Any]:
-    return evaluate(Outcome(estimate, len(estimate)), Reference(truth), PAIRING, aligned=aligned)
+    return evaluate(RunResult(estimate, len(estimate)), Reference(truth), PAIRING, aligned=aligned)
 
 
 def test_figures_by_hand() -> None:
@@ -126,8 +126,8 @@ def test_nothing_scored_gives_no_figures() -> None:
 
 def test_the_thesis_results_recomputed() -> None:
     """Thesis, Appendix D and section 5.1: the relative figures hold."""
-    outcome, reference, losses = read_run(APPENDIX_D)
-    found: dict[str, Any] = evaluate(outcome, reference, PAIRING)
+    run, reference, losses = read_run(APPENDIX_D)
+    found: dict[str, Any] = evaluate(run, reference, PAIRING)
     x, y = found["axis"]["x"], found["axis"]["y"]
     assert x["mean_relative_percent"] == pytest.approx(0.3432, abs=5e-5)
     assert y["mean_relative_percent"] == pytest.approx(0.4931, abs=5e-5)

@@ -8,7 +8,7 @@ from mcap_landmarks.geometry.se2 import Array, rotation
 from mcap_landmarks.lidar import shapes
 from mcap_landmarks.lidar.beams import sweep
 from mcap_landmarks.lidar.cells import Noise
-from mcap_landmarks.lidar.centres import Centres, centres
+from mcap_landmarks.lidar.centres import CentrePosteriors, centres
 from mcap_landmarks.lidar.segments import Breaks, points_of, segments
 from mcap_landmarks.lidar.shapes import Shape, profile
 from mcap_landmarks.lidar.windows import windows
@@ -31,7 +31,7 @@ def placed(kind: str, x: float, y: float, rng: np.random.Generator) -> list[Thin
 KINDS = {"disc": shapes.disc(0.15), "box": shapes.box(0.5, 0.28), "legs": shapes.legs(0.06, (0.16, 0.32))}
 
 
-def estimates(kind: str, near_m: float, far_m: float) -> Iterator[tuple[Array, Centres]]:
+def estimates(kind: str, near_m: float, far_m: float) -> Iterator[tuple[Array, CentrePosteriors]]:
     """True centres and what is made of one scan each, from all sides."""
     rng = np.random.default_rng(7)
     for _ in range(CASES):

@@ -12,11 +12,11 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
 
 if TYPE_CHECKING:
-    from mcap_landmarks.evaluation.metrics import Evaluation, Outcome, Pairing, Reference
+    from mcap_landmarks.evaluation.metrics import Evaluation, Pairing, Reference, RunResult
     from mcap_landmarks.evaluation.pose_metrics import Figures
 
 
-class Association(StrEnum):
+class PoseAssociation(StrEnum):
     """How poses find their truth in time."""
 
     INTERPOLATE = "interpolate"
@@ -31,8 +31,8 @@ def command(
         bool, typer.Option("--align", help="Move the poses by the one SE(2) that fits them best.")
     ] = False,
     association: Annotated[
-        Association, typer.Option("--association", help="Interpolate the truth, or take the nearest within 10 ms.")
-    ] = Association.INTERPOLATE,
+        PoseAssociation, typer.Option("--association", help="Interpolate the truth, or take the nearest within 10 ms.")
+    ] = PoseAssociation.INTERPOLATE,
     max_gap: Annotated[
         float, typer.Option("--max-gap", min=0, help="Longest gap of the truth to interpolate over, in seconds.")
     ] = 0.5,
@@ -53,14 +53,14 @@ def command(
     from mcap_landmarks.evaluation.read import read_reference, read_run
 
     with progress(f"read {result.name}", result.stat().st_size if result.is_file() else None) as advance:
-        outcome, truth, losses = read_run(result, advance)
+        run, truth, losses = read_run(result, advance)
     if reference is not None:
         other, more = read_reference(reference)
         truth, losses = other.over(truth), losses + more
-    _check(result, outcome, truth)
+    _check(result, run, truth)
     pairing = _pairing(association, max_gap)
-    document = evaluate(outcome, truth, pairing, aligned=align)
-    _export(outcome, truth, pairing, tum, thesis)
+    document = evaluate(run, truth, pairing, aligned=align)
+    _export(run, truth, pairing, tum, thesis)
     if document["localized"] and not document["scored"] and truth.trajectory is not None:
         warn(f"note: {result}: no pose has a truth near enough in time; see --max-gap and --association")
     if json:
@@ -73,26 +73,26 @@ def command(
         raise typer.Exit(PARTIAL)
 
 
-def _check(result: Path, outcome: "Outcome", truth: "Reference") -> None:
+def _check(result: Path, run: "RunResult", truth: "Reference") -> None:
     from mcap_landmarks.errors import RecordingError, UsageError
 
-    if not outcome.bundles and not len(outcome.trajectory) and outcome.landmarks is None:
+    if not run.bundles and not len(run.trajectory) and run.landmarks is None:
         raise RecordingError(f"{result}: has no results to evaluate; run localize on it first")
     if truth.trajectory is None and truth.objects is None:
         raise UsageError(f"{result}: holds no truth; name a log or a TUM trajectory that has it with --reference")
-    if not len(outcome.trajectory) and not outcome.bundles and truth.objects is None:
+    if not len(run.trajectory) and not run.bundles and truth.objects is None:
         raise UsageError(f"{result}: a map is measured against objects; name a log with them with --reference")
 
 
-def _pairing(association: Association, max_gap_s: float) -> "Pairing":
+def _pairing(association: PoseAssociation, max_gap_s: float) -> "Pairing":
     from mcap_landmarks.evaluation.trajectory import interpolated, nearest
 
-    if association is Association.NEAREST:
+    if association is PoseAssociation.NEAREST:
         return partial(nearest, max_difference_ns=10_000_000)
     return partial(interpolated, max_gap_ns=round(max_gap_s * 1e9))
 
 
-def _export(outcome: "Outcome", truth: "Reference", pairing: "Pairing", tum: Path | None, thesis: Path | None) -> None:
+def _export(run: "RunResult", truth: "Reference", pairing: "Pairing", tum: Path | None, thesis: Path | None) -> None:
     from mcap_landmarks.atomic import atomic_file
     from mcap_landmarks.evaluation.metrics import score
     from mcap_landmarks.evaluation.thesis_results import results_of
@@ -101,11 +101,11 @@ def _export(outcome: "Outcome", truth: "Reference", pairing: "Pairing", tum: Pat
 
     if tum:
         with atomic_file(tum) as stream:
-            stream.write(render(outcome.trajectory).encode())
+            stream.write(render(run.trajectory).encode())
     if thesis:
-        scored = score(outcome.trajectory, truth, pairing, aligned=False)
+        scored = score(run.trajectory, truth, pairing, aligned=False)
         with atomic_file(thesis) as stream:
-            stream.write(render_results(results_of(outcome, scored)).encode())
+            stream.write(render_results(results_of(run, scored)).encode())
 
 
 def _print(document: "Evaluation") -> None:

@@ -35,8 +35,8 @@ def command(
 ) -> None:
     """Plot INPUT... into one picture (.png, .svg, .pdf): landmarks by class, paths, positions and their errors."""
     from mcap_landmarks.atomic import atomic_file
-    from mcap_landmarks.report.comparison import errors_figure, positions_figure
     from mcap_landmarks.report.drawing import gather
+    from mcap_landmarks.report.error_plots import errors_figure, positions_figure
     from mcap_landmarks.report.plots import figure, form_of, save
 
     form = form_of(output)

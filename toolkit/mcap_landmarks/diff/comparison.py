@@ -7,12 +7,12 @@ from pathlib import Path
 
 from mcap_landmarks.channels import ANNOTATIONS
 from mcap_landmarks.diff.channel import ChannelDiff
-from mcap_landmarks.diff.conditions import Condition, figures
+from mcap_landmarks.diff.conditions import FailCondition, figures
 from mcap_landmarks.diff.declared import by_topic, manifest_rows, structure_rows
 from mcap_landmarks.diff.document import DiffDocument, ManifestRow, MetricEntry, StructureRow
 from mcap_landmarks.diff.logs import Topic, compare_messages
 from mcap_landmarks.diff.maps import FIELDS, diff_maps
-from mcap_landmarks.diff.metrics import metric_names, metric_rows
+from mcap_landmarks.diff.metric_rows import metric_names, metric_rows
 from mcap_landmarks.diff.tolerances import Declared, asked, declared
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.evaluation.metrics import alignment_document
@@ -42,7 +42,7 @@ def diff(
     baseline: Path,
     candidate: Path,
     tolerances: Sequence[str] = (),
-    conditions: Sequence[Condition] = (),
+    conditions: Sequence[FailCondition] = (),
     *,
     reference: Path | None = None,
     aligned: bool = False,
@@ -72,7 +72,7 @@ def _of_logs(
     baseline: Path,
     candidate: Path,
     tolerances: Sequence[str],
-    conditions: Sequence[Condition],
+    conditions: Sequence[FailCondition],
     reference: Path | None,
     progress: Progress | None,
 ) -> Diff:
@@ -101,7 +101,7 @@ def _of_maps(
     baseline: Path,
     candidate: Path,
     tolerances: Sequence[str],
-    conditions: Sequence[Condition],
+    conditions: Sequence[FailCondition],
     reference: Path | None,
     *,
     aligned: bool,
@@ -186,7 +186,7 @@ def _equal_bytes(baseline: Path, candidate: Path) -> bool:
 
 
 def _judged(
-    document: DiffDocument, conditions: Sequence[Condition], names: Mapping[str, Sequence[str]], losses: list[str]
+    document: DiffDocument, conditions: Sequence[FailCondition], names: Mapping[str, Sequence[str]], losses: list[str]
 ) -> Diff:
     if conditions:
         known = figures(document, metric_names(), names)

@@ -24,7 +24,7 @@ _UNCHANGED: FieldEntry = {"changed": 0, "largest": 0.0, "tolerance": {}, "transi
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
+class FailCondition:
     """A figure of the diff by name, and what it is compared with."""
 
     text: str
@@ -52,7 +52,7 @@ class Condition:
         return _COMPARISONS[self.comparison](self.value(figures), self.limit)
 
 
-def parse(text: str) -> Condition:
+def parse(text: str) -> FailCondition:
     """The condition of a text `NAME > NUMBER`.
 
     Raises:
@@ -65,7 +65,7 @@ def parse(text: str) -> Condition:
         limit = None
     if parts is None or limit is None or limit != limit:  # noqa: PLR0124 - NaN compares with nothing
         raise UsageError(f"--fail-on {text}: write NAME > NUMBER, such as 'position.rmse_m > 0.05'")
-    return Condition(text.strip(), parts["name"], parts["comparison"], limit)
+    return FailCondition(text.strip(), parts["name"], parts["comparison"], limit)
 
 
 def figures(

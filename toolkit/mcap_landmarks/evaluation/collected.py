@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.channels import MAP, MAP_POSE, POSE, TRUTH_OBJECTS, TRUTH_POSE
 from mcap_landmarks.errors import MessageError, RecordingError
-from mcap_landmarks.evaluation.metrics import Outcome, Reference
+from mcap_landmarks.evaluation.metrics import Reference, RunResult
 from mcap_landmarks.evaluation.trajectory import Indices, Trajectory
 from mcap_landmarks.geometry.angles import yaw_from_quaternion
 from mcap_landmarks.geometry.se2 import Array
@@ -77,7 +77,7 @@ class Collected:
         else:
             self._scenes(table, messages)
 
-    def outcome(self) -> Outcome:
+    def result(self) -> RunResult:
         """What the run gave."""
         matches = self.statuses.total()
         continuous = not matches and POSE.topic not in self.poses
@@ -85,7 +85,7 @@ class Collected:
         statuses = {status.name.lower(): self.statuses[status] for status in Status} if matches else None
         trajectory = _trajectory(made, [] if continuous else self.covariances)
         landmarks = self.once.get(MAP.topic)
-        return Outcome(trajectory, matches or self.scenes, self.eligible, statuses, landmarks, self.seen, continuous)
+        return RunResult(trajectory, matches or self.scenes, self.eligible, statuses, landmarks, self.seen, continuous)
 
     def reference(self) -> Reference:
         """The truth that the recording holds."""

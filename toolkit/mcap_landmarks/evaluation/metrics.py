@@ -19,16 +19,16 @@ from mcap_landmarks.evaluation.pose_metrics import (
     position_figures,
     relative_pose_error,
 )
-from mcap_landmarks.evaluation.trajectory import Indices, Pairs, Trajectory
+from mcap_landmarks.evaluation.trajectory import Indices, PosePairs, Trajectory
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.scene import SceneObjects
 
-Pairing = Callable[[Trajectory, Trajectory], Pairs]
+Pairing = Callable[[Trajectory, Trajectory], PosePairs]
 NOWHERE = Trajectory.of(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Outcome:
+class RunResult:
     """What a run gave: poses, bundles in all and by status, the map it used or made; None where it has none.
 
     eligible: how many of the bundles hold two distinct objects or more. seen: ids of the matched landmarks by time.
@@ -99,20 +99,20 @@ class Evaluation(TypedDict):
     alignment: dict[str, float] | None
 
 
-def evaluate(outcome: Outcome, reference: Reference, pairing: Pairing, *, aligned: bool = False) -> Evaluation:
+def evaluate(run: RunResult, reference: Reference, pairing: Pairing, *, aligned: bool = False) -> Evaluation:
     """How good a run and its map are.
 
     Figures are over scored poses: those that have a reference; figures and shares of nothing are None.
     """
-    scored = score(outcome.trajectory, reference, pairing, aligned=aligned)
+    scored = score(run.trajectory, reference, pairing, aligned=aligned)
     errors = pose_errors(scored.estimate, scored.reference)
-    landmarks, objects = outcome.landmarks, reference.objects
+    landmarks, objects = run.landmarks, reference.objects
     return {
-        "bundles": outcome.bundles,
-        "eligible": outcome.eligible,
-        "localized": len(outcome.trajectory) if outcome.statuses is None else outcome.statuses["localized"],
+        "bundles": run.bundles,
+        "eligible": run.eligible,
+        "localized": len(run.trajectory) if run.statuses is None else run.statuses["localized"],
         "scored": len(errors),
-        "statuses": outcome.statuses,
+        "statuses": run.statuses,
         "false": false_figures(errors),
         "position": position_figures(errors),
         "axis": {

@@ -18,7 +18,7 @@ from mcap_landmarks.channels import (
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.evaluation import tum
 from mcap_landmarks.evaluation.collected import ONCE, Collected
-from mcap_landmarks.evaluation.metrics import NOWHERE, Outcome, Reference
+from mcap_landmarks.evaluation.metrics import NOWHERE, Reference, RunResult
 from mcap_landmarks.evaluation.trajectory import Trajectory
 from mcap_landmarks.maps.database import read_map
 from mcap_landmarks.maps.exchange import read_text
@@ -35,7 +35,7 @@ _AT_ONCE = 2000
 """So many messages become columns together; memory stays small."""
 
 
-def read_run(path: Path, progress: Progress | None = None) -> tuple[Outcome, Reference, list[str]]:
+def read_run(path: Path, progress: Progress | None = None) -> tuple[RunResult, Reference, list[str]]:
     """What a file holds to evaluate, its own reference, and what of it could not be read.
 
     The file is a recording with results, a landmark database, or (.txt) results as in the thesis's Appendix D.
@@ -46,9 +46,9 @@ def read_run(path: Path, progress: Progress | None = None) -> tuple[Outcome, Ref
     if path.suffix == ".txt":
         return *_appendix_d(path), []
     if is_database(path):
-        return Outcome(NOWHERE, 0, landmarks=scene_from_map(read_map(path), 0)), Reference(), []
+        return RunResult(NOWHERE, 0, landmarks=scene_from_map(read_map(path), 0)), Reference(), []
     found = _collect(path, (*_RESULTS, *_TRUTH), progress)
-    return found.outcome(), found.reference(), found.losses
+    return found.result(), found.reference(), found.losses
 
 
 def read_reference(path: Path, progress: Progress | None = None) -> tuple[Reference, list[str]]:
@@ -66,14 +66,14 @@ def read_reference(path: Path, progress: Progress | None = None) -> tuple[Refere
     return reference, found.losses
 
 
-def _appendix_d(path: Path) -> tuple[Outcome, Reference]:
+def _appendix_d(path: Path) -> tuple[RunResult, Reference]:
     results = parse_results(read_text(path), str(path))
     count = len(results.classes)
     unknown = np.full((count, 1), np.nan)  # the thesis estimates no heading
     rows = np.arange(count) * 10**10  # apart in time, since each position stands alone
     eligible = sum(len(classes) >= 2 for classes in results.classes)
     estimate = Trajectory.of(rows, np.hstack([results.estimate_xy, unknown]))
-    return Outcome(estimate, count, eligible), Reference(
+    return RunResult(estimate, count, eligible), Reference(
         Trajectory.of(rows, np.hstack([results.reference_xy, unknown]))
     )
 

@@ -30,14 +30,14 @@ class Trajectory:
         return cls(stamps, np.asarray(poses, dtype=np.float64).reshape(-1, 3)[first], spread[first])
 
 
-class Pairs(NamedTuple):
+class PosePairs(NamedTuple):
     """K poses of an estimate, by index (K,), and the reference's poses (K, 3) that belong to them."""
 
     estimate: Indices
     reference: Array
 
 
-def interpolated(estimate: Trajectory, reference: Trajectory, max_gap_ns: int) -> Pairs:
+def interpolated(estimate: Trajectory, reference: Trajectory, max_gap_ns: int) -> PosePairs:
     """Pair estimates with the reference interpolated on SE(2) at their times.
 
     Nothing is extrapolated, and no gap of the reference longer than `max_gap_ns` is bridged.
@@ -52,10 +52,10 @@ def interpolated(estimate: Trajectory, reference: Trajectory, max_gap_ns: int) -
     poses[inside] = interpolate(known, reference.poses, at[inside]) if inside.any() else poses[inside]
     poses[exact] = reference.poses[right[exact]]
     found = np.flatnonzero(inside | exact)
-    return Pairs(found, poses[found])
+    return PosePairs(found, poses[found])
 
 
-def nearest(estimate: Trajectory, reference: Trajectory, max_difference_ns: int) -> Pairs:
+def nearest(estimate: Trajectory, reference: Trajectory, max_difference_ns: int) -> PosePairs:
     """Pair each pose of the shorter trajectory with the other's nearest in time, as evo does (1.38).
 
     Of two equally near ones the earlier is taken; one pose may be the nearest of several. Times are compared as float
@@ -63,9 +63,9 @@ def nearest(estimate: Trajectory, reference: Trajectory, max_difference_ns: int)
     """
     if len(estimate) > len(reference):
         asked, found = _nearest(reference.time_ns, estimate.time_ns, max_difference_ns)
-        return Pairs(found, reference.poses[asked])
+        return PosePairs(found, reference.poses[asked])
     asked, found = _nearest(estimate.time_ns, reference.time_ns, max_difference_ns)
-    return Pairs(asked, reference.poses[found])
+    return PosePairs(asked, reference.poses[found])
 
 
 def _nearest(short_ns: Indices, long_ns: Indices, max_difference_ns: int) -> tuple[Indices, Indices]:

@@ -27,7 +27,7 @@ _EDGE_M = 0.03
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Centres:
+class CentrePosteriors:
     """Of C clusters under S shapes: log_evidence (C, S), -inf where it cannot be; positions_xy (C, S, 2), covariances
     (C, S, 2, 2) in m^2, both in the base frame and meaningless where the evidence is -inf.
 
@@ -41,7 +41,7 @@ class Centres:
 
 def centres(
     window: Windows, shapes: Sequence[Shape], noise: Noise, allowed: NDArray[np.bool_] | None = None
-) -> Centres:
+) -> CentrePosteriors:
     """The posteriors of the centre over position, turn and size, of each shape, all equally likely before.
 
     Position across the view, turn and size are integrated over a grid that is refined where the posterior lies; the
@@ -49,7 +49,7 @@ def centres(
     does is not refined. `allowed` (C, S) says which shapes come into question, if not all.
     """
     known, many = shape_table(shapes), (len(window), len(shapes))
-    found = Centres(
+    found = CentrePosteriors(
         np.full(many, -np.inf),
         np.repeat(window.anchors_xy[:, None], many[1], axis=1),
         np.broadcast_to(np.eye(2), (*many, 2, 2)).copy(),
@@ -98,7 +98,7 @@ class _Search:
         clusters: NDArray[np.intp],
         which: NDArray[np.intp],
         noise: Noise,
-        found: Centres,
+        found: CentrePosteriors,
     ) -> None:
         self._window, self._clusters, self._which = window, clusters, which
         self._found, self._noise = found, noise

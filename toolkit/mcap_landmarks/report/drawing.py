@@ -10,7 +10,7 @@ import numpy as np
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.evaluation.alignment import fit
 from mcap_landmarks.evaluation.landmark_metrics import associate
-from mcap_landmarks.evaluation.metrics import Outcome, Reference, ScoredPoses, score
+from mcap_landmarks.evaluation.metrics import Reference, RunResult, ScoredPoses, score
 from mcap_landmarks.evaluation.pose_metrics import align
 from mcap_landmarks.evaluation.read import read_run
 from mcap_landmarks.evaluation.trajectory import Trajectory, interpolated
@@ -57,10 +57,10 @@ def gather(paths: Sequence[Path], *, aligned: bool, progress: Progress | None = 
     drawing = Drawing()
     losses: list[str] = []
     for path in paths:
-        outcome, reference, problems = read_run(path, progress)
+        result, reference, problems = read_run(path, progress)
         losses.extend(f"{path}: {problem}" for problem in problems)
-        groups = read_map(path).groups if not outcome.bundles and outcome.landmarks is not None else ()
-        drawing = _with(drawing, path.stem, outcome, reference, groups, aligned=aligned)
+        groups = read_map(path).groups if not result.bundles and result.landmarks is not None else ()
+        drawing = _with(drawing, path.stem, result, reference, groups, aligned=aligned)
     if drawing.landmarks is None and drawing.objects is None and not drawing.runs:
         raise RecordingError(f"{paths[0]}: has neither poses nor landmarks to draw; run map or localize first")
     if aligned and not any(len(run.scored.rows) for run in drawing.runs):
@@ -69,23 +69,23 @@ def gather(paths: Sequence[Path], *, aligned: bool, progress: Progress | None = 
 
 
 def _with(
-    drawing: Drawing, name: str, outcome: Outcome, reference: Reference, groups: tuple[Group, ...], *, aligned: bool
+    drawing: Drawing, name: str, result: RunResult, reference: Reference, groups: tuple[Group, ...], *, aligned: bool
 ) -> Drawing:
-    if drawing.landmarks is None and outcome.landmarks is not None:
-        drawing = replace(drawing, landmarks=outcome.landmarks, groups=groups)
+    if drawing.landmarks is None and result.landmarks is not None:
+        drawing = replace(drawing, landmarks=result.landmarks, groups=groups)
     if drawing.objects is None:
         drawing = replace(drawing, objects=reference.objects)
-    if not len(outcome.trajectory) and reference.trajectory is None:
+    if not len(result.trajectory) and reference.trajectory is None:
         return drawing
     pairing = partial(interpolated, max_gap_ns=_MAX_GAP_NS)
-    scored = score(outcome.trajectory, reference, pairing, aligned=aligned)
-    estimate = outcome.trajectory
+    scored = score(result.trajectory, reference, pairing, aligned=aligned)
+    estimate = result.trajectory
     if scored.reference_from_estimate is not None and len(scored.rows):
         moved = align(scored.reference_from_estimate, estimate.poses, estimate.covariances)
         estimate = Trajectory(estimate.time_ns, *moved)
         if not drawing.runs:
             drawing = _moved(drawing, scored.reference_from_estimate)
-    run = Run(name, estimate, outcome.continuous, reference.trajectory, scored)
+    run = Run(name, estimate, result.continuous, reference.trajectory, scored)
     return replace(drawing, runs=(*drawing.runs, run))
 
 

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(slots=True)
-class Table:
+class MrclamTable:
     """Rows of one file by time: `time_ns` (N,) and the other columns `values` (N, columns - 1).
 
     dropped: rows left out, by reason. notes: what else was mended. losses: what could not be understood.
@@ -45,7 +45,7 @@ class DataSet:
         """Numbers of the robots that have a file."""
         return sorted({int(match[1]) for name in self._names if (match := _ROBOT.fullmatch(name))})
 
-    def table(self, robot: int, content: str) -> Table | None:
+    def table(self, robot: int, content: str) -> MrclamTable | None:
         """A robot's `Odometry`, `Measurement` or `Groundtruth`, None if there is no such file."""
         name = f"Robot{robot}_{content}.dat"
         return _timed(name, self._read(name), _COLUMNS[content]) if name in self._names else None
@@ -135,14 +135,14 @@ def _rows(text: str, columns: int) -> tuple[list[list[float]], int, bool]:
     return rows, bad, last_bad
 
 
-def _timed(name: str, text: str, columns: int) -> Table:
+def _timed(name: str, text: str, columns: int) -> MrclamTable:
     rows, bad, cut = _rows(text, columns)
     values = np.array(rows, dtype=np.float64).reshape(-1, columns)
     finite = np.isfinite(values).all(axis=1) & (np.abs(values[:, 0]) < 9e9)
     values = values[finite]
     # The files have milliseconds; a double holds microseconds of the epoch exactly enough.
     time_ns = np.round(values[:, 0] * 1e6).astype(np.int64) * 1000
-    table = Table(time_ns, values[:, 1:], len(text))
+    table = MrclamTable(time_ns, values[:, 1:], len(text))
     if not finite.all():
         table.dropped[f"{name}: not finite"] = int((~finite).sum())
     if bad:
@@ -156,7 +156,7 @@ def _timed(name: str, text: str, columns: int) -> Table:
     return table
 
 
-def keep(table: Table, mask: NDArray[np.bool_], reason: str) -> None:
+def keep(table: MrclamTable, mask: NDArray[np.bool_], reason: str) -> None:
     """Leave out the rows outside the mask and count them."""
     left_out = int((~mask).sum())
     if left_out:

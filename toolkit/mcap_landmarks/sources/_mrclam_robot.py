@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import exp, rotation
-from mcap_landmarks.sources._mrclam_files import Array, Table, keep
+from mcap_landmarks.sources._mrclam_files import Array, MrclamTable, keep
 
 FIRST_LANDMARK = 6  # subjects 1 to 5 are the robots
 
@@ -42,7 +42,7 @@ class Scans:
     covariances: Array
 
 
-def clean_odometry(table: Table, name: str) -> None:
+def clean_odometry(table: MrclamTable, name: str) -> None:
     """Keep one row per time stamp, the last, which is the speed that holds from then on."""
     last = np.append(np.diff(table.time_ns) > 0, np.ones(min(len(table.time_ns), 1), dtype=bool))
     keep(table, last, f"{name}: same time as the next row")
@@ -91,7 +91,7 @@ def _running(steps: Array) -> Array:
     return np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
 
 
-def scans(table: Table, name: str, subjects: dict[int, int], config: MrclamConfig) -> Scans:
+def scans(table: MrclamTable, name: str, subjects: dict[int, int], config: MrclamConfig) -> Scans:
     """Measured objects in the robot's frame; a scan whose rows are all left out stays, empty.
 
     `table.values` are barcode, range, bearing; `subjects` gives the subject of a barcode.

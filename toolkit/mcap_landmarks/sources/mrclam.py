@@ -26,7 +26,7 @@ from mcap_landmarks.messages.qos import KEY, qos_profile
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.typestore import definition
 from mcap_landmarks.sources._merge import merge
-from mcap_landmarks.sources._mrclam_files import DataSet, Table, file_names, keep, open_data_set
+from mcap_landmarks.sources._mrclam_files import DataSet, MrclamTable, file_names, keep, open_data_set
 from mcap_landmarks.sources._mrclam_robot import (
     FIRST_LANDMARK,
     MrclamConfig,
@@ -76,12 +76,12 @@ def open_mrclam(path: Path, config: MrclamConfig) -> Iterator[Sequence[SourceLog
 
 
 def _robot(data: DataSet, robot: int, subjects: dict[int, int], config: MrclamConfig) -> SourceLog:
-    make: dict[str, Callable[[Table, str], _Track]] = {
+    make: dict[str, Callable[[MrclamTable, str], _Track]] = {
         "Odometry": lambda table, name: _odometry(table, name, config),
         "Measurement": lambda table, name: _objects(table, name, subjects, config),
         "Groundtruth": _truth,
     }
-    found: list[Table] = []
+    found: list[MrclamTable] = []
     tracks: list[_Track] = []
     notes: list[str] = []
     for content, make_track in make.items():
@@ -148,12 +148,12 @@ def _connection(channel: Channel[Message], *, latched: bool = False) -> Connecti
 
 
 def _track(
-    channel: Channel[Message], table: Table, time_ns: NDArray[np.int64], message: Callable[[int], Message]
+    channel: Channel[Message], table: MrclamTable, time_ns: NDArray[np.int64], message: Callable[[int], Message]
 ) -> _Track:
     return _Track(_connection(channel), time_ns, message, table.size_bytes / max(len(time_ns), 1))
 
 
-def _odometry(table: Table, name: str, config: MrclamConfig) -> _Track:
+def _odometry(table: MrclamTable, name: str, config: MrclamConfig) -> _Track:
     clean_odometry(table, name)
     time_ns, speeds = table.time_ns, table.values
     poses = integrate(time_ns, speeds)
@@ -166,7 +166,7 @@ def _odometry(table: Table, name: str, config: MrclamConfig) -> _Track:
     return _track(ODOMETRY, table, time_ns, message)
 
 
-def _objects(table: Table, name: str, subjects: dict[int, int], config: MrclamConfig) -> _Track:
+def _objects(table: MrclamTable, name: str, subjects: dict[int, int], config: MrclamConfig) -> _Track:
     found = scans(table, name, subjects, config)
 
     def message(i: int) -> SceneObjects:
@@ -186,7 +186,7 @@ def _objects(table: Table, name: str, subjects: dict[int, int], config: MrclamCo
     return _track(SCENE_OBJECTS, table, found.time_ns, message)
 
 
-def _truth(table: Table, name: str) -> _Track:
+def _truth(table: MrclamTable, name: str) -> _Track:
     new = np.append(np.ones(min(len(table.time_ns), 1), dtype=bool), np.diff(table.time_ns) > 0)
     keep(table, new, f"{name}: same time as the row before")
 

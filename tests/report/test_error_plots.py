@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from mcap_landmarks.report.comparison import errors_figure, positions_figure
 from mcap_landmarks.report.drawing import gather
+from mcap_landmarks.report.error_plots import errors_figure, positions_figure
 
 APPENDIX_D = Path(__file__).parents[1] / "data" / "thesis_appendix_d.txt"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mcap_landmarks.diff.document import MetricEntry
 from mcap_landmarks.errors import RecordingError
-from mcap_landmarks.evaluation.metrics import NOWHERE, Outcome, Reference, evaluate
+from mcap_landmarks.evaluation.metrics import NOWHERE, Reference, RunResult, evaluate
 from mcap_landmarks.evaluation.read import read_reference, read_run
 from mcap_landmarks.evaluation.trajectory import interpolated
 from mcap_landmarks.maps.map_message import scene_from_map
@@ -20,7 +20,7 @@ def metric_names() -> list[str]:
     """Every figure that there can be, by its dotted name."""
     nothing = scene_from_map(LandmarkMap.surveyed((), (), [], Source("reference", "none")), 0)
     statuses = {status.name.lower(): 0 for status in Status}
-    document = evaluate(Outcome(NOWHERE, 0, 0, statuses, nothing), Reference(NOWHERE, nothing), _PAIRING)
+    document = evaluate(RunResult(NOWHERE, 0, 0, statuses, nothing), Reference(NOWHERE, nothing), _PAIRING)
     return [name for name in _flat(document) if name != "alignment"]
 
 
