@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from tests.benchmark import mutant_runs
-from tests.benchmark.mutant_runs import KILLED, ROOT, SOURCES, SURVIVED, TIMED_OUT, Copy, Suite
-from tests.benchmark.mutants import Outcomes, Sample
+from tests.benchmark.kept import ROOT
+from tests.benchmark.mutant_runs import KILLED, SOURCES, SURVIVED, TIMED_OUT, Copy, Suite
+from tests.benchmark.mutants import Sample
 from tests.benchmark.mutation import Mutant, mutants_of
 
 
@@ -113,14 +114,6 @@ def test_tests_that_execute_the_change_come_first() -> None:
     tests = Suite("p", 3.6, durations, {"p/a.py": {4: {"long"}, 5: {"short"}, 9: {"same file"}}})
     mutant = Mutant("p/a.py", 4, 5, 0, 0, "", "", "", "")
     assert tests.likeliest_first(mutant) == ["short", "long", "same file", "quick", "elsewhere"]
-
-
-def test_outcomes_of_a_run_that_was_cut_off_are_known(tmp_path: Path) -> None:
-    file, mutant = tmp_path / "outcomes", Mutant("p/a.py", 4, 5, 10, 12, "a", "b", "(b)", "x = a")
-    Outcomes.of(file).add(mutant, SURVIVED)
-    assert Outcomes.of(file).known == {mutant.key: SURVIVED}
-    file.write_text(file.read_text().replace('"sources": "', '"sources": "of another state '))
-    assert Outcomes.of(file).known == {}
 
 
 MODULE = """

@@ -71,9 +71,11 @@ def speed_of(folder: Path, quick: bool) -> Iterator[Row]:
     took_s = time.perf_counter() - start
     images = summary.messages["/camera/image_raw/compressed"]
     label = f"loop, images at {staged.scenario.camera.rate_hz:g} Hz, {WORKERS} workers"
-    yield Row(f"{label}: simulated over real time", summary.simulated_s / took_s, "x", at_least=3, cases=images)
+    yield Row(
+        f"{label}: simulated over real time", summary.simulated_s / took_s, "x real time", at_least=3, cases=images
+    )
     yield Row(f"{label}: images", images / took_s, "1/s", cases=images)
-    yield Row("loop: simulation alone over real time", _simulation_alone(staged), "x")
+    yield Row("loop: simulation alone over real time", _simulation_alone(staged), "x real time")
 
 
 def _simulation_alone(staged: Staged) -> float:

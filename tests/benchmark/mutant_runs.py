@@ -15,10 +15,10 @@ from pathlib import Path
 from coverage import CoverageData
 
 from tests.benchmark.covered_first import ORDER, SECONDS, TAKEN
+from tests.benchmark.kept import ROOT
 from tests.benchmark.mutation import Mutant
 from tests.shared import data_folder
 
-ROOT = Path(__file__).resolve().parents[2]
 SOURCES = "toolkit/mcap_landmarks"
 # Of processor time, which other work on the machine does not change; a process that sleeps gets some times as much.
 LIMIT_S = 90
@@ -133,13 +133,15 @@ class Copy:
         """Exit code, None after the limit, and output of the quick tests of a package."""
         command = [sys.executable, "-m", "pytest", "-q", "-m", "not slow", "-p", "tests.benchmark.covered_first"]
         path = os.pathsep.join(str(self.folder / name) for name in ("toolkit", "generator"))
-        one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+        given: dict[str, str] = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+        given["PYTHONDONTWRITEBYTECODE"] = ""  # else every start compiles everything
         data = data_folder()
-        found = {} if data is None else {"MCAP_LANDMARKS_DATA": str(data)}
+        if data is not None:
+            given["MCAP_LANDMARKS_DATA"] = str(data)
         with subprocess.Popen(
             [*command, *options, f"tests/{package}"],
             cwd=self.folder,
-            env={**os.environ, **one_thread, **found, **variables, SECONDS: str(limit_s), "PYTHONPATH": path},
+            env={**os.environ, **given, **variables, SECONDS: str(limit_s), "PYTHONPATH": path},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

@@ -7,20 +7,18 @@ Each mutant meets the quick tests of its package (`-m "not slow"`); those that s
 """
 
 import argparse
-import hashlib
-import json
 import random
 import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
-from threading import Lock
 
-from tests.benchmark.mutant_runs import ROOT, SOURCES, SURVIVED, TIMED_OUT, Copy, Suite
+from tests.benchmark.kept import ROOT, Kept
+from tests.benchmark.mutant_runs import SOURCES, SURVIVED, TIMED_OUT, Copy, Suite
 from tests.benchmark.mutation import Mutant, mutants_of
 from tests.benchmark.rows import Row, main
 
@@ -55,41 +53,6 @@ class Sample:
         return cls(package, drawn, len(every))
 
 
-@dataclass(slots=True)
-class Outcomes:
-    """What became of mutants, kept in a file if there is one; what it has of other sources or tests does not count."""
-
-    file: Path | None
-    fingerprint: str
-    known: dict[str, str] = field(default_factory=dict)
-    lock: Lock = field(default_factory=Lock)
-
-    @classmethod
-    def of(cls, file: Path | None) -> "Outcomes":
-        """With what a run that was cut off has left."""
-        found = cls(file, _fingerprint())
-        if file is not None and file.exists():
-            entries = [json.loads(line) for line in file.read_text().splitlines()]
-            found.known = {e["mutant"]: e["outcome"] for e in entries if e["sources"] == found.fingerprint}
-        return found
-
-    def add(self, mutant: Mutant, outcome: str) -> None:
-        """Keep one."""
-        with self.lock:
-            self.known[mutant.key] = outcome
-            if self.file is not None:
-                entry = {"sources": self.fingerprint, "mutant": mutant.key, "outcome": outcome}
-                with self.file.open("a") as stream:
-                    stream.write(json.dumps(entry) + "\n")
-
-
-def _fingerprint() -> str:
-    digest = hashlib.sha256()
-    for file in sorted([*(ROOT / SOURCES).rglob("*.py"), *(ROOT / "tests").rglob("*.py"), ROOT / "pyproject.toml"]):
-        digest.update(file.relative_to(ROOT).as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
-    return digest.hexdigest()
-
-
 def measure(
     quick: bool, listed: bool, seed: int, packages: list[str], mutants: int | None, resume: Path | None
 ) -> Iterator[Row]:
@@ -102,13 +65,13 @@ def measure(
             print("\n".join(map(str, sample.drawn)))
     if listed:
         return
-    outcomes = Outcomes.of(resume)
+    outcomes = Kept.of(resume)
     _run([sample for sample in samples if any(mutant.key not in outcomes.known for mutant in sample.drawn)], outcomes)
     for sample in samples:
         yield _row(sample, outcomes, seed)
 
 
-def _row(sample: Sample, outcomes: Outcomes, seed: int) -> Row:
+def _row(sample: Sample, outcomes: Kept, seed: int) -> Row:
     became = {mutant: outcomes.known[mutant.key] for mutant in sample.drawn}
     counts = Counter(became.values())
     survivors = [mutant for mutant in sample.drawn if became[mutant] == SURVIVED]
@@ -121,7 +84,7 @@ def _row(sample: Sample, outcomes: Outcomes, seed: int) -> Row:
     return Row(f"killed_{sample.package}", share, at_least=_GOAL, cases=len(became), peers=peers)
 
 
-def _run(samples: list[Sample], outcomes: Outcomes) -> None:
+def _run(samples: list[Sample], outcomes: Kept) -> None:
     """What is not known yet, in copies that take turns; first the tests without any mutant."""
     with tempfile.TemporaryDirectory(prefix="mutants-") as name, ThreadPoolExecutor(_AT_ONCE) as pool:
         copies: SimpleQueue[Copy] = SimpleQueue()
@@ -141,7 +104,7 @@ def _run(samples: list[Sample], outcomes: Outcomes) -> None:
                 outcome = copy.run(mutant, tests)
             finally:
                 copies.put(copy)
-            outcomes.add(mutant, outcome)
+            outcomes.add(mutant.key, outcome)
             _say(f"{outcome}: {mutant}")
 
         try:

@@ -38,7 +38,12 @@ def measure(quick: bool) -> Iterator[Row]:
     peers = {"log": lasts_s, "localize": localize_s, "evaluate": evaluate_s, "map of another log": map_s}
     share = (localize_s + evaluate_s) / lasts_s
     yield Row(
-        "small: raw log to evaluated positions / its length", share, "x", at_most=0.5, cases=len(rounds), peers=peers
+        "small: raw log to evaluated positions / its length",
+        share,
+        "x real time",
+        at_most=0.5,
+        cases=len(rounds),
+        peers=peers,
     )
     yield Row("small: positions, RMSE aligned", scores["position"]["rmse_m"], "m", cases=scores["localized"])
 
