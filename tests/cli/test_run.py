@@ -13,7 +13,7 @@ from mcap_landmarks.maps.database import write_map
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.resources import resource
-from mcap_landmarks.runs import stage_runner as step
+from mcap_landmarks.runs import stage_runner
 from mcap_landmarks.runs.tallies import tally
 
 from tests.cli.calls import call
@@ -145,7 +145,7 @@ def test_an_interruption_leaves_finished_stages(
             signal.raise_signal(signal.SIGINT)
         return tally(message)
 
-    monkeypatch.setattr(step, "tally", interrupting)
+    monkeypatch.setattr(stage_runner, "tally", interrupting)
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts background jobs without it
     words = ("run", here / "log.mcap", "--stages", FRONT, "-o", out)
     assert call(*words, "--model", here / "model.onnx") == 130

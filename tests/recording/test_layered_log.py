@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from mcap_landmarks.channels import CAMERA_IMAGE, ODOMETRY, SCAN
-from mcap_landmarks.recording.layered_log import Layer, View
+from mcap_landmarks.recording.layered_log import Layer, LayeredLog
 from mcap_landmarks.recording.reader import open_recording
 
 from tests.cli.logs import write
@@ -15,7 +15,7 @@ def test_layers_come_in_order_and_are_read_by_need(tmp_path: Path) -> None:
     with open_recording(path) as one, open_recording(path) as other:
         pick = {entry.connection.topic: entry for entry in one.channels}
         again = {entry.connection.topic: entry for entry in other.channels}
-        view = View(
+        view = LayeredLog(
             path, [Layer(one, (pick[SCAN.topic], pick[ODOMETRY.topic])), Layer(other, (again[CAMERA_IMAGE.topic],))]
         )
         read: list[int] = []

@@ -12,7 +12,7 @@ from mcap_landmarks.maps.database import write_map
 from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import create_recording
-from mcap_landmarks.runs import session as bench
+from mcap_landmarks.runs import session
 from mcap_landmarks.runs.bundles import Span
 from mcap_landmarks.runs.pipeline import LogRun, run_stages
 from mcap_landmarks.runs.plan import Request, Step
@@ -152,20 +152,20 @@ def test_results_made_from_replaced_ones_are_left_out(here: Path) -> None:
 
 
 def test_a_finished_stage_survives_a_run_that_fails(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    looks, out, work = counted(monkeypatch), here / "out.mcap", bench.run_step
+    looks, out, work = counted(monkeypatch), here / "out.mcap", session.run_stage
 
     def failing(step: Step, *rest: object) -> object:
         if step.stage.name == "fuse":
             raise KeyboardInterrupt
         return work(step, *rest)  # type: ignore[arg-type] # as it was called
 
-    monkeypatch.setattr(bench, "run_step", failing)
+    monkeypatch.setattr(session, "run_stage", failing)
     with pytest.raises(KeyboardInterrupt):
         run_stages(asked(here), out, ALL, "run")
     assert not out.exists()
     left = sorted(path.name.partition("-")[0] for path in (here / ".out.mcap.parts").iterdir())
     assert left == ["cluster", "detect"]
-    monkeypatch.setattr(bench, "run_step", work)
+    monkeypatch.setattr(session, "run_stage", work)
     run = run_stages(asked(here), out, ALL, "run")
     assert states(run) == {"cluster": "reused", "detect": "reused", "fuse": "ran", "localize": "ran"}
     assert reasons(run)["detect"] == "the same results are in what an unfinished run left"

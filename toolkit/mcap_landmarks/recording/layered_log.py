@@ -12,7 +12,7 @@ from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessag
 
 
 class Readable(Protocol):
-    """Channels whose messages can be read in the order of time: an open recording is one, and a view."""
+    """Channels whose messages can be read in the order of time: an open recording is one, and a layered log."""
 
     @property
     def path(self) -> Path:
@@ -41,7 +41,7 @@ class Layer:
     record: StageRecord | None = None
 
 
-class View:
+class LayeredLog:
     """Layers that are read as one recording. Messages of equal time come in the order of the layers."""
 
     def __init__(self, path: Path, layers: Sequence[Layer]) -> None:

@@ -21,7 +21,7 @@ from mcap_landmarks.messages.poses import Path as PathMessage
 from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.runs.bundles import Reading, inputs_of, read_bundles
-from mcap_landmarks.runs.output_writer import assemble
+from mcap_landmarks.runs.output_writer import write_output
 from mcap_landmarks.runs.pipeline import check_output, told
 from mcap_landmarks.runs.plan import (
     Request,
@@ -33,7 +33,7 @@ from mcap_landmarks.runs.plan import (
     plan,
     record_of,
 )
-from mcap_landmarks.runs.session import Bench, StageRun, open_bench, part_file, parts_folder
+from mcap_landmarks.runs.session import Session, StageRun, open_session, part_file, parts_folder
 from mcap_landmarks.runs.stage_runner import bundle_count, counted, outcome_of
 from mcap_landmarks.stage import Reduction, Stamped, Watch, unwatched
 from mcap_landmarks.stages import find_stage
@@ -127,13 +127,13 @@ def _reduction() -> Reduction:
 
 
 def _plan_log(place: str, stage: Reduction, config: Any, request: Request, task: MapTask, parts: Path) -> _LogPlan:
-    with open_bench(request, parts, None) as bench:
+    with open_session(request, parts, None) as session:
         sensed = [channel for channel in stage.reads if not is_result(channel, request.span.choice)]
-        inputs_of(bench.log.view(), sensed, sensed, request.span.choice)  # before hours are spent on the others
-        steps = tuple(plan(request, bench.log, missing_stages(stage, bench.log)))
+        inputs_of(session.log.view(), sensed, sensed, request.span.choice)  # before hours are spent on the others
+        steps = tuple(plan(request, session.log, missing_stages(stage, session.log)))
         options = choice_options(request.span.choice, stage.reads)
-        record = record_of(stage, config, task.files, inputs_of_stage(stage, bench.log, steps), options)
-        return _LogPlan(place, request, bench.log.recording.fingerprint(), steps, record)
+        record = record_of(stage, config, task.files, inputs_of_stage(stage, session.log, steps), options)
+        return _LogPlan(place, request, session.log.recording.fingerprint(), steps, record)
 
 
 def _check_each_once(plans: Sequence[_LogPlan]) -> None:
@@ -159,8 +159,8 @@ def _found(task: MapTask, plans: Sequence[_LogPlan], record: StageRecord, parts:
     for entry in plans:
         output = task.outputs.get(entry.request.recording)
         if output is not None:
-            with open_bench(entry.request, parts, output) as bench:
-                if bench.find(_share(entry, record)) is None:
+            with open_session(entry.request, parts, output) as session:
+                if session.find(_share(entry, record)) is None:
                     return None
     reason = "the map was made from the same logs, files and settings"
     logs = []
@@ -191,9 +191,9 @@ def _build(
     reason = reason or "an output has no results of it"
     logs, observations = [], []
     for entry in plans:
-        with open_bench(entry.request, parts, task.outputs.get(entry.request.recording)) as bench:
-            runs = [bench.work(step, watch) for step in entry.steps]
-            found, outcome = _collect(stage, config, bench, entry, watch)
+        with open_session(entry.request, parts, task.outputs.get(entry.request.recording)) as session:
+            runs = [session.work(step, watch) for step in entry.steps]
+            found, outcome = _collect(stage, config, session, entry, watch)
         notes, losses = told([*runs, StageRun(stage.name, "ran", reason, outcome)], [], [])
         outcome = dataclasses.replace(outcome, losses=losses, notes=notes)
         observations.append(found)
@@ -231,14 +231,14 @@ def _found_by(logs: Sequence[MappedLog]) -> str:
 
 
 def _collect(
-    stage: Reduction, config: Any, bench: Bench, entry: _LogPlan, watch: Watch
+    stage: Reduction, config: Any, session: Session, entry: _LogPlan, watch: Watch
 ) -> tuple[LogObservations, Outcome]:
     """Observations of one log.
 
     Raises:
         RecordingError: it has no scene objects or no odometry, or none of its bundles has odometry.
     """
-    span, reading, view = bench.request.span, Reading(), bench.view(entry.record)
+    span, reading, view = session.request.span, Reading(), session.view(entry.record)
     inputs = inputs_of(view, stage.reads, stage.reads, span.choice)
     with watch(f"read {view.path.name}", bundle_count(stage, view, span), "bundles") as progress:
         raws = counted(view.messages(tuple(inputs), span.start_ns, span.end_ns), inputs, stage.reads[0], progress)
@@ -284,11 +284,11 @@ def _write_log(
 ) -> MappedLog:
     """Write one log with all its results; what became of it, with what showed on the way."""
     output, outcome = task.outputs[log.recording], log.outcome
-    with open_bench(entry.request, parts, output) as bench:
+    with open_session(entry.request, parts, output) as session:
         for step in entry.steps:
-            if bench.find(step.record) is None:
-                bench.work(step, watch)
-        bench.find(_share(entry, record))
-        notes, losses = assemble(bench, output, "map", [other.fingerprint for other in plans], watch)
+            if session.find(step.record) is None:
+                session.work(step, watch)
+        session.find(_share(entry, record))
+        notes, losses = write_output(session, output, "map", [other.fingerprint for other in plans], watch)
     notes_told, losses_told = told([StageRun(record.stage, "", "", outcome)], notes, losses)
     return dataclasses.replace(log, outcome=dataclasses.replace(outcome, notes=notes_told, losses=losses_told))

@@ -15,7 +15,7 @@ from mcap_landmarks.messages.match import LandmarkMatch
 from mcap_landmarks.recording.association import WINDOW_NS
 from mcap_landmarks.runs.bundles import Reading, inputs_of, read_bundles
 from mcap_landmarks.runs.plan import Request, Step, missing_stages, plan
-from mcap_landmarks.runs.session import Bench, open_bench
+from mcap_landmarks.runs.session import Session, open_session
 from mcap_landmarks.runs.stage_runner import bundle_count, counted, naming
 from mcap_landmarks.stage import Omission, Stamped, Watch, unwatched
 from mcap_landmarks.stages import find_stage
@@ -47,23 +47,23 @@ def localize_at(request: Request, time_ns: int, watch: Watch = unwatched) -> tup
     """
     with tempfile.TemporaryDirectory(prefix="mcap-landmarks-") as folder:
         parts = Path(folder)
-        with open_bench(request, parts, None) as bench:
-            before = missing_stages(find_stage(_LOCALIZE), bench.log)
-            if set(before) <= set(bench.log.results):
-                return _localized(bench, before, time_ns, watch)
+        with open_session(request, parts, None) as session:
+            before = missing_stages(find_stage(_LOCALIZE), session.log)
+            if set(before) <= set(session.log.results):
+                return _localized(session, before, time_ns, watch)
         end_ns = time_ns + 2 * WINDOW_NS
         span = dataclasses.replace(request.span, end_ns=min(request.span.end_ns or end_ns, end_ns))
-        with open_bench(dataclasses.replace(request, span=span), parts, None) as bench:
-            return _localized(bench, before, time_ns, watch)
+        with open_session(dataclasses.replace(request, span=span), parts, None) as session:
+            return _localized(session, before, time_ns, watch)
 
 
-def _localized(bench: Bench, before: list[str], time_ns: int, watch: Watch) -> tuple[Answer, Reading]:
-    *steps, last = plan(bench.request, bench.log, [*before, _LOCALIZE])
+def _localized(session: Session, before: list[str], time_ns: int, watch: Watch) -> tuple[Answer, Reading]:
+    *steps, last = plan(session.request, session.log, [*before, _LOCALIZE])
     for step in steps:
-        bench.work(step, watch)
+        session.work(step, watch)
     reading = Reading()
     nearest: Answer | None = None
-    with contextlib.closing(_results(bench, last, reading, watch)) as results:
+    with contextlib.closing(_results(session, last, reading, watch)) as results:
         for answer in _answers(results):
             if nearest is None or abs(answer.stamp_ns - time_ns) < abs(nearest.stamp_ns - time_ns):
                 nearest = answer
@@ -71,12 +71,12 @@ def _localized(bench: Bench, before: list[str], time_ns: int, watch: Watch) -> t
                 break
     if nearest is None or abs(nearest.stamp_ns - time_ns) > WINDOW_NS:
         known = "there is none at all" if nearest is None else f"the nearest is at {nearest.stamp_ns}"
-        raise UsageError(f"{bench.log.path}: no bundle within 2 s of {time_ns}; {known}")
+        raise UsageError(f"{session.log.path}: no bundle within 2 s of {time_ns}; {known}")
     return nearest, reading
 
 
-def _results(bench: Bench, step: Step, reading: Reading, watch: Watch) -> Generator[Stamped | Omission, None, None]:
-    view, span = bench.view(step.record), bench.request.span
+def _results(session: Session, step: Step, reading: Reading, watch: Watch) -> Generator[Stamped | Omission, None, None]:
+    view, span = session.view(step.record), session.request.span
     inputs = inputs_of(view, step.stage.reads, step.stage.reads[:1], span.choice)
     count = bundle_count(step.stage, view, span)
     with watch(f"{step.stage.name} {view.path.name}", count, "bundles") as progress:

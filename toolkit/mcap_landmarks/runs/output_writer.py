@@ -19,14 +19,16 @@ from mcap_landmarks.manifest import (
     told_losses,
 )
 from mcap_landmarks.recording.latched import carried_note, latched, latest
-from mcap_landmarks.recording.layered_log import Layer, View, own_layer
+from mcap_landmarks.recording.layered_log import Layer, LayeredLog, own_layer
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.recording.writer import RecordingWriter, create_recording
-from mcap_landmarks.runs.session import Bench
+from mcap_landmarks.runs.session import Session
 from mcap_landmarks.stage import Connection, RawMessage, Watch
 
 
-def assemble(bench: Bench, output: Path, verb: str, inputs: Sequence[str], watch: Watch) -> tuple[list[str], list[str]]:
+def write_output(
+    session: Session, output: Path, verb: str, inputs: Sequence[str], watch: Watch
+) -> tuple[list[str], list[str]]:
     """Write the output, unless it is there already; notes on what is in it, and what of the log is unreadable.
 
     `inputs` are the fingerprints of all recordings that the results were made from.
@@ -34,32 +36,32 @@ def assemble(bench: Bench, output: Path, verb: str, inputs: Sequence[str], watch
     Raises:
         ToolkitError: the output cannot be written; nothing is left behind.
     """
-    results, stale = bench.kept_results()
+    results, stale = session.kept_results()
     notes = [f"{name}'s results in the log were made from results that changed; they are left out" for name in stale]
-    request, source = bench.request, bench.log.recording
-    fingerprint = narrowed(bench.log.fingerprint, results_only=request.results_only)
+    request, source = session.request, session.log.recording
+    fingerprint = narrowed(session.log.fingerprint, results_only=request.results_only)
     cut = (request.span.start_ns, request.span.end_ns) != (None, None)
     records = tuple(
-        replace(layer.record, is_cut=layer.record.is_cut or (cut and layer.record.stage not in bench.of_this_run))
+        replace(layer.record, is_cut=layer.record.is_cut or (cut and layer.record.stage not in session.of_this_run))
         for layer in results
         if layer.record is not None
     )
     manifest = Manifest(verb, inputs=tuple(inputs), options=request.options(), fingerprint=fingerprint, stages=records)
     metadata = {**source.metadata, RUN: manifest.entries()}
-    own = _own(bench, results)
-    earlier = bench.earlier
+    own = _own(session, results)
+    earlier = session.earlier
     if not request.force and earlier is not None and _is_there(earlier, metadata, own, results, source):
         losses, carried = [*source.losses, *told_losses(earlier.metadata)], told_carried(earlier.metadata)
     else:
-        losses, carried = _write(bench, output, metadata, [own, *results], watch)
+        losses, carried = _write(session, output, metadata, [own, *results], watch)
     return [*notes, *([carried_note(carried)] if carried else [])], losses
 
 
 def _write(
-    bench: Bench, output: Path, metadata: Mapping[str, Mapping[str, str]], layers: Sequence[Layer], watch: Watch
+    session: Session, output: Path, metadata: Mapping[str, Mapping[str, str]], layers: Sequence[Layer], watch: Watch
 ) -> tuple[list[str], dict[str, int]]:
     """Write the output; what of the log is unreadable, and what was carried over from before its start, by topic."""
-    span, source, view = bench.request.span, bench.log.recording, View(bench.log.path, layers)
+    span, source, view = session.request.span, session.log.recording, LayeredLog(session.log.path, layers)
     carried = [] if span.start_ns is None else _before(view, span.start_ns)
     counts = dict(Counter(raw.connection.topic for raw in carried))
     size = view.size_bytes(None, span.start_ns, span.end_ns)
@@ -67,22 +69,22 @@ def _write(
         clean = _declare(writer, layers[0])
         for raw in chain(carried, view.messages(None, span.start_ns, span.end_ns, progress)):
             writer.write(raw._replace(connection=clean[raw.connection]) if raw.connection in clean else raw)
-        for attachment in () if bench.request.results_only else source.attachments():
+        for attachment in () if session.request.results_only else source.attachments():
             writer.attach(attachment)
         told = {LOSSES: source.losses, CARRIED: counts}
         writer.metadata[RUN].update({name: entry_text(value) for name, value in told.items() if value})
     return list(source.losses), counts
 
 
-def _before(view: View, start_ns: int) -> list[RawMessage]:
+def _before(view: LayeredLog, start_ns: int) -> list[RawMessage]:
     """What holds at the start of an output because of messages before it."""
     return latest(view.messages(latched(entry.connection for entry in view.channels), None, start_ns), start_ns)
 
 
-def _own(bench: Bench, results: Sequence[Layer]) -> Layer:
+def _own(session: Session, results: Sequence[Layer]) -> Layer:
     """What of the log's own messages goes into the output."""
-    own = bench.own_without({entry.connection.topic for layer in results for entry in layer.channels})
-    return replace(own, channels=()) if bench.request.results_only else own
+    own = session.own_without({entry.connection.topic for layer in results for entry in layer.channels})
+    return replace(own, channels=()) if session.request.results_only else own
 
 
 def _declare(writer: RecordingWriter, own: Layer) -> dict[Connection, Connection]:

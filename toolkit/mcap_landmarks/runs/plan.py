@@ -10,7 +10,7 @@ from mcap_landmarks.config import Settings, effective, load_files
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.inspection.topic_roles import ROLES, Choice, choose, could_be
 from mcap_landmarks.manifest import RECORDING, StageRecord, code_hash, file_hash, narrowed
-from mcap_landmarks.recording.layered_log import View, own_layer, result_layers
+from mcap_landmarks.recording.layered_log import LayeredLog, own_layer, result_layers
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.runs.bundles import Span
 from mcap_landmarks.runs.thinning import Thinning
@@ -71,9 +71,9 @@ class Log:
         self.fingerprint = narrowed(recording.fingerprint(), start_ns=span.start_ns, end_ns=span.end_ns)
         self.choice = span.choice
 
-    def view(self) -> View:
+    def view(self) -> LayeredLog:
         """Its own messages."""
-        return View(self.path, [self.own])
+        return LayeredLog(self.path, [self.own])
 
     def has(self, channel: Channel[Any]) -> bool:
         """Whether the recording has messages of its own for a channel.

@@ -10,10 +10,10 @@ from pathlib import Path
 from mcap_landmarks.channels import TF
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.manifest import Outcome, StageRecord
-from mcap_landmarks.recording.layered_log import Layer, View, result_layers
+from mcap_landmarks.recording.layered_log import Layer, LayeredLog, result_layers
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.runs.plan import Log, Request, Step
-from mcap_landmarks.runs.stage_runner import bundle_count, run_step
+from mcap_landmarks.runs.stage_runner import bundle_count, run_stage
 from mcap_landmarks.stage import Watch
 
 
@@ -59,19 +59,19 @@ def part_file(folder: Path, record: StageRecord) -> Path:
 
 
 @contextlib.contextmanager
-def open_bench(request: Request, parts: Path, output: Path | None) -> Iterator["Bench"]:
-    """A bench for one log, with the results that lie in the log, in an earlier `output` and among the `parts`.
+def open_session(request: Request, parts: Path, output: Path | None) -> Iterator["Session"]:
+    """One log to work on, with the results that lie in the log, in an earlier `output` and among the `parts`.
 
     Raises:
         RecordingError: the log cannot be read.
     """
     with ExitStack() as stack:
         log = Log(stack.enter_context(open_recording(request.recording)), request.span)
-        yield Bench(stack, request, log, parts, output)
+        yield Session(stack, request, log, parts, output)
 
 
-class Bench:
-    """One log and its results so far; made by `open_bench`."""
+class Session:
+    """One log and its results so far; made by `open_session`."""
 
     def __init__(self, stack: ExitStack, request: Request, log: Log, parts: Path, output: Path | None) -> None:
         self.request, self.log = request, log
@@ -85,11 +85,11 @@ class Bench:
                 self.earlier = self._open(output)
                 self._stores.append(("the earlier output", result_layers(self.earlier)))
 
-    def view(self, record: StageRecord) -> View:
+    def view(self, record: StageRecord) -> LayeredLog:
         """What a stage sees: the log, with the results that its record says it reads."""
         read = [self.results[name] for name in sorted(record.inputs) if name in self.results]
         topics = {entry.connection.topic for layer in read for entry in layer.channels}
-        return View(self.log.path, [self.own_without(topics), *read])
+        return LayeredLog(self.log.path, [self.own_without(topics), *read])
 
     def work(self, step: Step, watch: Watch) -> StageRun:
         """The results of a step: found, or made now."""
@@ -99,7 +99,7 @@ class Bench:
         reason, (stage, span) = self._why(step.record), (step.stage, self.request.span)
         view, target = self.view(step.record), part_file(self._parts, step.record)
         with watch(f"{stage.name} {self.log.path.name}", bundle_count(stage, view, span), "bundles") as progress:
-            record = run_step(step, view, span, self.request.thinning, target, progress)
+            record = run_stage(step, view, span, self.request.thinning, target, progress)
         self.take(target)
         return StageRun(stage.name, "ran", reason, record.outcome)
 

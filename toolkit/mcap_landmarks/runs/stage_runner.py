@@ -11,7 +11,7 @@ from mcap_landmarks.errors import MessageError, RecordingError, UsageError
 from mcap_landmarks.inspection.topic_roles import beside_camera_info, choose, message_type
 from mcap_landmarks.manifest import RUN, Manifest, Outcome, StageRecord
 from mcap_landmarks.messages.codec import decode
-from mcap_landmarks.recording.layered_log import Readable, View
+from mcap_landmarks.recording.layered_log import LayeredLog, Readable
 from mcap_landmarks.recording.odometry_buffer import odometry_from
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.runs.bundles import Reading, Span, held_before, inputs_of, read_bundles
@@ -21,7 +21,9 @@ from mcap_landmarks.runs.thinning import Thinning, thin
 from mcap_landmarks.stage import Channel, Connection, Omission, Progress, RawMessage, Reduction, Stage, Stamped
 
 
-def run_step(step: Step, view: View, span: Span, thinning: Thinning, target: Path, progress: Progress) -> StageRecord:
+def run_stage(
+    step: Step, view: LayeredLog, span: Span, thinning: Thinning, target: Path, progress: Progress
+) -> StageRecord:
     """Run a stage over a view; its results, with the record that is returned, become the recording `target`.
 
     Raises:
@@ -53,7 +55,7 @@ def outcome_of(reading: Reading, counts: Counter[str] | None = None, notes: tupl
     return Outcome(reading.association.bundles, unreadable, counted, reading.notes(), tuple(reading.losses), notes)
 
 
-def bundle_count(stage: Stage | Reduction, view: View, span: Span) -> int:
+def bundle_count(stage: Stage | Reduction, view: LayeredLog, span: Span) -> int:
     """About how many bundles a stage will have to work on."""
     inputs = inputs_of(view, stage.reads, stage.reads[:1], span.choice)
     return view.count(
@@ -73,7 +75,7 @@ def counted(
 
 def _raws(
     stage: Stage,
-    view: View,
+    view: LayeredLog,
     inputs: dict[Connection, Channel[Any]],
     span: Span,
     thinning: Thinning,
@@ -109,7 +111,7 @@ def _omit(omission: Omission, primary: Connection, reading: Reading) -> None:
 
 
 def _writes(
-    stage: Stage, view: View, inputs: Mapping[Connection, Channel[Any]], config: Any
+    stage: Stage, view: LayeredLog, inputs: Mapping[Connection, Channel[Any]], config: Any
 ) -> tuple[dict[Channel[Any], Channel[Any]], tuple[str, ...]]:
     """The stage's channels and those that they become here, and what is to be said about them.
 
