@@ -15,7 +15,7 @@ from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.qos import KEY
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
-from mcap_landmarks.recording.latched import lasting
+from mcap_landmarks.recording.latched import latched
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.runs.bundles import Span
@@ -157,7 +157,7 @@ def test_without_static_transforms_the_others_hold(here: Path) -> None:
 def test_what_lasts(topic: str, kind: str, durability: str, lasts: bool) -> None:
     several = f"- history: 1\n  durability: 2\n  depth: 1\n- history: 1\n  durability: {durability}\n  depth: 1"
     connection = Connection(topic, kind, b"", metadata={KEY: several})
-    assert lasting([connection]) == [connection] * lasts
+    assert latched([connection]) == [connection] * lasts
 
 
 def test_whole_logs_and_results_alone_carry_nothing(here: Path) -> None:
