@@ -1,4 +1,6 @@
-"""Every channel that we write or read by name, once."""
+"""Every channel that we write or read by name, once, and where those go that have no topic of their own."""
+
+from itertools import takewhile
 
 from mcap_landmarks.messages.annotations import ImageAnnotations
 from mcap_landmarks.messages.detections import Detections
@@ -10,7 +12,7 @@ from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage
-from mcap_landmarks.stage import Channel
+from mcap_landmarks.stage import Channel, InputLog
 
 CAMERA_IMAGE = Channel("/camera/image_raw/compressed", CompressedImage)
 CAMERA_INFO = Channel("/camera/camera_info", CameraInfo)
@@ -44,5 +46,28 @@ RESULTS, TRUTH = "/landmarks/", "/ground_truth/"
 """What the topics of results and of the generator's truth begin with."""
 NO_SCENES = frozenset({SCAN_OBJECTS.topic, MAP.topic, TRUTH_OBJECTS.topic})
 """Topics of ours whose messages are of the scenes' type, but are none."""
+SHARED = frozenset({TF.topic})
+"""Topics that many write to: results there stand beside a log's own messages, elsewhere in their place."""
 
 MAP_FRAME, ODOM_FRAME, BASE_FRAME = "map", "odom", "base_footprint"
+
+
+def annotations_topic(log: InputLog, _config: object) -> str:
+    """The topic of ANNOTATIONS for a log's primary channel, images: in the camera's namespace, where Foxglove looks.
+
+    That is the parent of the CameraInfo topic that shares most of the image's path, else of the image topic.
+    """
+    image, kind = log.primary.topic, CameraInfo.ROS_TYPE
+    infos = [entry.connection.topic for entry in log.channels if entry.connection.message_type == kind]
+    shared = {topic: shared_namespaces(image, topic) for topic in infos}
+    base = image.removesuffix("/compressed")
+    nearest = max(sorted(infos), key=shared.__getitem__, default=base)
+    if len(infos) > 1 and not shared[nearest]:  # several cameras, none of them this one
+        nearest = base
+    return f"{nearest.rpartition('/')[0]}/{ANNOTATIONS.topic.rpartition('/')[2]}"
+
+
+def shared_namespaces(one: str, other: str) -> int:
+    """The number of namespaces that two topics share from their roots on."""
+    pairs = zip(one.strip("/").split("/")[:-1], other.strip("/").split("/")[:-1], strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))

@@ -8,17 +8,18 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
 from mcap_landmarks.errors import ToolkitError, UsageError
-from mcap_landmarks.resources import detector
 from mcap_landmarks.sources import find_source, source_names
-from mcap_landmarks.stage import Stage
+from mcap_landmarks.stage import Config, Stage
 from mcap_landmarks.stages import find_stage, stage_names
 
-Settings = dict[str, dict[str, Any]]
+C = TypeVar("C", bound=Config)
+Settings = dict[str, dict[str, object]]
+"""What the user set: value by key, by stage or source. What is not set has the default of the dataclass."""
 
 
 def gather(file: Path | None, settings: Sequence[str], method: str | None) -> Settings:
@@ -46,7 +47,7 @@ def gather(file: Path | None, settings: Sequence[str], method: str | None) -> Se
 class Declaration:
     """What can be configured of a stage or source: its dataclass, and the files that it takes."""
 
-    config: type[Any]
+    config: type[Config]
     files: tuple[str, ...] = ()
 
 
@@ -55,8 +56,7 @@ def declaration(name: str) -> Declaration:
     if name in source_names():
         return Declaration(find_source(name).config)
     stage = find_stage(name)
-    files = (*stage.resources, *stage.options) if isinstance(stage, Stage) else ()
-    return Declaration(stage.config, files)
+    return Declaration(stage.config, stage.files)
 
 
 _WORDS = {"tuple_type": 'give a list, such as ["person", "suitcase"] or [0.1, 0.3]'}
@@ -87,15 +87,21 @@ def _from_text(text: str) -> Settings:
     raise UsageError(f"--set {text}: write STAGE.KEY=VALUE, such as localize.max_sigma_m=0.3")
 
 
-def _merge(into: dict[str, Any], other: Mapping[str, Any]) -> None:
+def _merge(into: Settings, other: Settings) -> None:
+    for name, table in other.items():
+        into[name] = _merged(into.get(name, {}), table)
+
+
+def _merged(one: Mapping[str, object], other: Mapping[str, object]) -> dict[str, object]:
+    """The keys of both; tables below are merged likewise, whatever else is in both is the other's."""
+    merged = dict(one)
     for key, value in other.items():
-        if isinstance(value, dict) and isinstance(into.get(key), dict):
-            _merge(into[key], value)
-        else:
-            into[key] = value
+        below = merged.get(key)
+        merged[key] = _merged(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
+    return merged
 
 
-def stage_config(config: type[Any], stage: str, settings: Mapping[str, Any]) -> Any:
+def stage_config(config: type[C], stage: str, settings: Mapping[str, object]) -> C:
     """The configuration of one stage: its defaults with the settings over them.
 
     Raises:
@@ -113,7 +119,7 @@ def stage_config(config: type[Any], stage: str, settings: Mapping[str, Any]) -> 
     return made
 
 
-def _all_taken(given: Any, made: Any, where: str) -> None:
+def _all_taken(given: object, made: object, where: str) -> None:
     """Refuse what is given below the first level and is nowhere in what was made of it."""
     if isinstance(given, Mapping) and isinstance(made, Mapping):
         for key, value in given.items():
@@ -124,36 +130,38 @@ def _all_taken(given: Any, made: Any, where: str) -> None:
             _all_taken(one, other, f"{where}.{i}")
 
 
-def effective(config: Any) -> dict[str, Any]:
+def effective(config: Config) -> dict[str, object]:
     """Every key with its value, for the manifest."""
     return dataclasses.asdict(config)
 
 
-def load_files(stage: Stage, settings: Settings, given: Mapping[str, Path | None]) -> tuple[Any, dict[str, Path]]:
+def load_files(stage: Stage, settings: Settings, given: Mapping[str, Path | None]) -> tuple[Config, dict[str, Path]]:
     """The configuration of a stage, and its files: `given` ones, else those that the settings name, such as
     `detect.model`. Files are no part of the configuration, so that no path gets into a manifest.
 
     Raises:
         UsageError: a file that the stage cannot do without is not given.
     """
-    own, kinds = dict(settings.get(stage.name, {})), declaration(stage.name).files
-    files = {name: Path(str(own.pop(name))) for name in kinds if name in own}
-    files.update({name: path for name, path in given.items() if path is not None and name in kinds})
+    own = dict(settings.get(stage.name, {}))
+    files = {name: Path(str(own.pop(name))) for name in stage.files if name in own}
+    files.update({name: path for name, path in given.items() if path is not None and name in stage.files})
     for name in stage.resources:
         if name not in files:
-            files[name] = _bundled(stage.name, name)
+            files[name] = _bundled(stage, name)
     return stage_config(stage.config, stage.name, own), files
 
 
-def _bundled(stage: str, name: str) -> Path:
+def _bundled(stage: Stage, name: str) -> Path:
     """The file that travels with the program, where the user gives none."""
-    if (stage, name) == ("detect", "model"):
+    if name in stage.bundled:
         with contextlib.suppress(ToolkitError):
-            return detector()
-    raise UsageError(f"{stage} needs a {name} and none is bundled; give --{name} FILE or --set {stage}.{name}=FILE")
+            return stage.bundled[name]()
+    raise UsageError(
+        f"{stage.name} needs a {name} and none is bundled; give --{name} FILE or --set {stage.name}.{name}=FILE"
+    )
 
 
-def load(name: str, settings: Settings) -> Any:
+def load(name: str, settings: Settings) -> Config:
     """The configuration of a stage by name."""
     return stage_config(find_stage(name).config, name, settings.get(name, {}))
 

@@ -1,11 +1,16 @@
-"""The words that runs, stages and sources share: raw messages, channels, bundles, stages."""
+"""The words that runs, stages and sources share: raw messages, channels, bundles, stages.
+
+A stage is one file in `stages/` with a `Stage` named STAGE; no other file knows it by name. What is set with
+`--set fuse.bearing_gate=4` becomes the field `bearing_gate` of its `config`, a dataclass, and comes to its `process` as
+the second argument; `runs/plan.py` tells the way there.
+"""
 
 import contextlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import Field, dataclass, field
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +73,27 @@ class RawMessage(NamedTuple):
     data: bytes | memoryview
 
 
+class Readable(Protocol):
+    """Channels whose messages can be read in the order of time: an open recording is one, and a layered log."""
+
+    @property
+    def path(self) -> Path:
+        """Where the log lies, for messages to the user."""
+
+    @property
+    def channels(self) -> Sequence[ChannelSummary]:
+        """Every connection with its count."""
+
+    def messages(
+        self,
+        connections: Collection[Connection] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+        progress: Progress | None = None,
+    ) -> Iterator[RawMessage]:
+        """See `Recording.messages`."""
+
+
 @dataclass(frozen=True, slots=True)
 class Channel(Generic[M_co]):
     """A topic and the dataclass of its messages."""
@@ -83,6 +109,10 @@ class Stamped:
     channel: Channel[Message]
     log_time_ns: int
     message: Message
+
+    def get(self, channel: Channel[M]) -> M | None:
+        """The message, None if it is not one of a channel."""
+        return self.message if self.channel == channel and isinstance(self.message, channel.message) else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -155,26 +185,70 @@ class Tolerance(NamedTuple):
     relative: float = 0.0
 
 
+class Config(Protocol):
+    """The configuration of a stage or source: a frozen dataclass whose fields all have defaults."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+
+class InputLog(Readable, Protocol):
+    """A log as a stage will read it, for what has to be known before its first bundle."""
+
+    @property
+    def primary(self) -> Connection:
+        """The connection whose messages make the bundles."""
+
+    def first(self, channel: Channel[M]) -> M | None:
+        """The first message of a channel that the stage reads; None if there is none, or none that can be read."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeftOut:
+    """Why a stage does not write a channel to a log, in words for the user."""
+
+    reason: str
+
+
 Process = Callable[[Iterable[Bundle], Any, Mapping[str, Path]], Iterator[Stamped | Omission]]
+"""Results of bundles, of the stage's configuration (an object of its own dataclass) and of its files by name."""
+
+Place = Callable[[InputLog, Any], str | LeftOut]
+"""Of a log and the stage's configuration, the topic that a channel gets there."""
 
 
 @dataclass(frozen=True, slots=True)
 class Stage:
     """One step of the pipeline: what it reads and writes, its configuration and its code.
 
-    The first channel of `reads` is the primary one: each of its messages makes a bundle. `config` is a dataclass type;
-    `resources` are files that the runner opens, hashes and passes in, `options` files that may be missing; `tolerance`
-    says how far each field, by the name that `diff` gives it, may differ between two machines; a number is absolute.
+    The first channel of `reads` is the primary one: each of its messages makes a bundle, and a log must have it;
+    `thinned` lets --image-rate and --every leave out some of them. A channel of `writes` gets its own topic, or the one
+    that its function in `places` gives. `config` is a dataclass type. `resources` are files that the runner opens,
+    hashes and passes in, `options` files that may be missing; where the user gives none, a resource is what its
+    function in `bundled` gives, a file that travels with the program. `tolerance` says how far each field, by the name
+    that `diff` gives it, may differ between two machines; a number is absolute.
     """
 
     name: str
     reads: tuple[Channel[Message], ...]
     writes: tuple[Channel[Message], ...]
-    config: type[Any]
+    config: type[Config]
     process: Process
+    thinned: bool = False
+    places: Mapping[Channel[Message], Place] = field(default_factory=dict)
     resources: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
+    bundled: Mapping[str, Callable[[], Path]] = field(default_factory=dict)
     tolerance: Mapping[str, float | Tolerance] = field(default_factory=dict)
+
+    @property
+    def required(self) -> tuple[Channel[Message], ...]:
+        """The channels of `reads` that a log must have: nothing can be done without the primary one."""
+        return self.reads[:1]
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The names of all files that can be given."""
+        return *self.resources, *self.options
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,13 +256,23 @@ class Reduction:
     """The step that makes one result of many logs: `collect` per log, then `solve` over what was collected.
 
     `collect(bundles, config)` gives one log's observations, `solve(observations, prior, config)` the map and one
-    trajectory per log.
+    trajectory per log. A log must have every channel of `reads`.
     """
 
     name: str
     reads: tuple[Channel[Message], ...]
     writes: tuple[Channel[Message], ...]
-    config: type[Any]
+    config: type[Config]
     collect: Callable[[Iterable[Bundle], Any], Any]
     solve: Callable[..., Any]
     tolerance: Mapping[str, float | Tolerance] = field(default_factory=dict)
+
+    @property
+    def required(self) -> tuple[Channel[Message], ...]:
+        """The channels of `reads` that a log must have."""
+        return self.reads
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The names of the files that can be given in a configuration: there are none."""
+        return ()

@@ -11,7 +11,7 @@ app = typer.Typer(no_args_is_help=True)
 @app.command()
 def show(
     config_file: options.ConfigFile = None,
-    settings: options.Settings = None,
+    settings: options.Set = None,
     method: options.Method = None,
     json: options.Json = False,
 ) -> None:

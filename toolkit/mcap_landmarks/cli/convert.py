@@ -27,7 +27,7 @@ def command(
         str | None, typer.Option("--distro", help="ROS 2 distribution of bags without definitions, such as humble.")
     ] = None,
     config_file: options.ConfigFile = None,
-    settings: options.Settings = None,
+    settings: options.Set = None,
     json: options.Json = False,
 ) -> None:
     """Convert SRC... to MCAP with every message, or tell which ones were lost.

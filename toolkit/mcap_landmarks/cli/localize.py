@@ -29,13 +29,14 @@ def command(
         str | None,
         typer.Option("--at", help="Answer for this moment only, and write nothing: RFC 3339 or nanoseconds."),
     ] = None,
+    use: options.Use = None,
     extrinsics: options.Extrinsics = None,
 ) -> None:
     """Localize every bundle of LOG... in a landmark map; write the input with pose and match.
 
     Where a log has no scene objects, they are made first, from images and scans.
     """
-    asked = Given(given, images, scans, {"map": map_file, "extrinsics": extrinsics})
+    asked = Given(given, images, scans, {"map": map_file, "extrinsics": extrinsics}, use)
     asked_ns = options.time_ns(at, "--at")
     if asked_ns is not None:
         if output is not None or len(logs) > 1:

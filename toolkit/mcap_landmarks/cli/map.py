@@ -27,6 +27,7 @@ def command(
         bool, typer.Option("--from-reference", help="Take the map from LOG's /ground_truth/objects (a surveyed map).")
     ] = False,
     prior: Annotated[Path | None, typer.Option("--prior", help="Landmark database to extend and refine.")] = None,
+    use: options.Use = None,
     extrinsics: options.Extrinsics = None,
 ) -> None:
     """Build one landmark map from LOG...; with -o also write each log with its results.
@@ -36,7 +37,7 @@ def command(
     if from_reference:
         _from_reference(logs, map_file, given.json)
         return
-    asked = Given(given, images, scans, {"extrinsics": extrinsics})
+    asked = Given(given, images, scans, {"extrinsics": extrinsics}, use)
     run = _build(logs, map_file, prior, output, asked)
     for log in run.logs:
         tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)

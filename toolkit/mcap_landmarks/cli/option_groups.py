@@ -21,7 +21,7 @@ class LogOptions:
     """What every verb takes that runs stages over logs."""
 
     config_file: options.ConfigFile = None
-    settings: options.Settings = None
+    settings: options.Set = None
     method: options.Method = None
     start: options.Start = None
     end: options.End = None

@@ -54,11 +54,15 @@ Names = Annotated[Path | None, typer.Option("--names", help="Class names, one pe
 Extrinsics = Annotated[
     Path | None, typer.Option("--extrinsics", help="Where the sensors are on the robot, if the log does not say.")
 ]
+Use = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--use", metavar="STAGE", help="Stage to use where several can make what the log lacks; repeatable."
+    ),
+]
 Force = Annotated[bool, typer.Option("--force", help="Run every stage anew, also where its results are there.")]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="TOML file with one table per stage.")]
-Settings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="STAGE.KEY=VALUE", help="One setting; repeatable.")
-]
+Set = Annotated[list[str] | None, typer.Option("--set", metavar="STAGE.KEY=VALUE", help="One setting; repeatable.")]
 Method = Annotated[str | None, typer.Option("--method", help="Sets the method of every stage: default or thesis.")]
 
 

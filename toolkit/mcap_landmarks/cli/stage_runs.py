@@ -20,12 +20,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """What the options of a verb say about all its logs; `files` are those beside the model, by resource name."""
+    """What the options of a verb say about all its logs; `files` are those beside the model, by resource name.
+
+    `use` names the stages to use where several could make what a log lacks.
+    """
 
     options: LogOptions
     images: ImageOptions = field(default_factory=ImageOptions)
     scans: ScanOptions = field(default_factory=ScanOptions)
     files: Mapping[str, Path | None] = field(default_factory=dict)
+    use: Sequence[str] | None = None
 
     def requests(self, logs: Sequence[Path]) -> "list[Request]":
         """What to do with each log.
@@ -38,8 +42,8 @@ class Given:
 
         given, files = self.options, {"model": self.images.model, **self.files}
         settings = gather(given.config_file, [*(given.settings or []), *self.scans.settings()], given.method)
-        span, thinning = self._span(), self.images.thinning()
-        return [Request(log, settings, files, span, thinning, given.results_only, given.force) for log in logs]
+        span, thinning, use = self._span(), self.images.thinning(), tuple(self.use or ())
+        return [Request(log, settings, files, span, thinning, use, given.results_only, given.force) for log in logs]
 
     def _span(self) -> "Span":
         from mcap_landmarks.inspection.topic_roles import Choice, parse_remaps

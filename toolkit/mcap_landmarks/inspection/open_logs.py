@@ -11,7 +11,7 @@ from mcap_landmarks.errors import MessageError
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import RecordingWriter
 from mcap_landmarks.sources import Carried, Log, McapFile, source_of
-from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
+from mcap_landmarks.stage import ChannelSummary, Config, Connection, Progress, RawMessage
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class OpenLog:
     path: Path
     name: str
     source: str
-    config: object
+    config: Config
     parts: tuple[Log, ...]
     size_bytes: int
     losses: tuple[str, ...]

@@ -2,8 +2,6 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import takewhile
-from typing import Any
 
 from mcap_landmarks import channels
 from mcap_landmarks.errors import UsageError
@@ -14,8 +12,7 @@ from mcap_landmarks.messages.poses import Odometry, PoseStamped
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage
-from mcap_landmarks.recording.layered_log import Readable
-from mcap_landmarks.stage import Channel, Connection
+from mcap_landmarks.stage import Channel, Connection, Readable
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +34,7 @@ class Role:
         return tuple(message.ROS_TYPE for message in (*self.messages, *self.others))
 
 
-ROLES: Mapping[Channel[Any], Role] = {
+ROLES: Mapping[Channel[Message], Role] = {
     channels.CAMERA_IMAGE: Role("image", "--image", (CompressedImage, Image)),
     channels.CAMERA_INFO: Role("camera_info", "--remap", (CameraInfo,)),
     channels.SCAN: Role("scan", "--scan", (LaserScan,), (PointCloud2,)),
@@ -83,7 +80,7 @@ def topics_for(role: Role, present: Collection[tuple[str, str]]) -> list[str]:
     return [topic for topic in fitting if not topic.startswith(channels.RESULTS)]
 
 
-def could_be(recording: Readable, channel: Channel[Any]) -> str:
+def could_be(recording: Readable, channel: Channel[Message]) -> str:
     """Which topics a user could choose as a channel that none is by itself, and how; empty if there are none."""
     role = ROLES.get(channel)
     if role is None:
@@ -96,7 +93,7 @@ def could_be(recording: Readable, channel: Channel[Any]) -> str:
     return f"{' or '.join(fitting)} could be it, choose with {how}" if fitting else ""
 
 
-def choose(recording: Readable, channel: Channel[Any], choice: Choice) -> tuple[Connection, ...]:
+def choose(recording: Readable, channel: Channel[Message], choice: Choice) -> tuple[Connection, ...]:
     """The connections that a role is read from, none if the recording has no such topic.
 
     Raises:
@@ -139,34 +136,13 @@ def _of_the_image(recording: Readable, infos: list[str], choice: Choice) -> list
     images = choose(recording, channels.CAMERA_IMAGE, choice)
     if not images:
         return infos
-    shared = {topic: _shared(images[0].topic, topic) for topic in infos}
+    shared = {topic: channels.shared_namespaces(images[0].topic, topic) for topic in infos}
     return [topic for topic in infos if shared[topic] == max(shared.values())]
 
 
-def message_type(channel: Channel[Any], connection: Connection) -> type[Message]:
+def message_type(channel: Channel[Message], connection: Connection) -> type[Message]:
     """The dataclass of a connection's messages, where it is read as a channel: an image has two, odometry three."""
     role = ROLES.get(channel)
     known = (*role.messages, *role.others) if role else ()
     fitting = (message for message in known if connection.message_type == message.ROS_TYPE)
     return next(iter(fitting), channel.message)
-
-
-def beside_camera_info(recording: Readable, channel: Channel[Any], image: Connection) -> Channel[Any]:
-    """A channel moved into the namespace of an image's camera, where Foxglove looks for annotations.
-
-    That is the parent of the CameraInfo topic that shares most of the image's path, else of the image topic.
-    """
-    kind = CameraInfo.ROS_TYPE
-    infos = [entry.connection.topic for entry in recording.channels if entry.connection.message_type == kind]
-    shared = {topic: _shared(image.topic, topic) for topic in infos}
-    base = image.topic.removesuffix("/compressed")
-    nearest = max(sorted(infos), key=shared.__getitem__, default=base)
-    if len(infos) > 1 and not shared[nearest]:  # several cameras, none of them this one
-        nearest = base
-    return Channel(f"{nearest.rpartition('/')[0]}/{channel.topic.rpartition('/')[2]}", channel.message)
-
-
-def _shared(one: str, other: str) -> int:
-    """The number of namespaces that two topics share."""
-    pairs = zip(one.strip("/").split("/")[:-1], other.strip("/").split("/")[:-1], strict=False)
-    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))

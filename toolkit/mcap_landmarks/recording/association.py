@@ -3,7 +3,6 @@
 from collections import Counter, deque
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.poses import Odometry
@@ -34,13 +33,13 @@ class Association:
 
 
 def associate(
-    messages: Iterable[tuple[Channel[Any], int, Message]],
-    primary: Channel[Any],
+    messages: Iterable[tuple[Channel[Message], int, Message]],
+    primary: Channel[Message],
     counts: Association,
     *,
     with_odometry: bool = True,
-    held: Collection[Channel[Any]] = (),
-    beside: Collection[Channel[Any]] = (),
+    held: Collection[Channel[Message]] = (),
+    beside: Collection[Channel[Message]] = (),
 ) -> Iterator[Bundle]:
     """One bundle per message of the channel `primary`, with odometry interpolated at its stamp if that is wanted.
 
@@ -62,11 +61,11 @@ class _Table:
 
     def __init__(
         self,
-        primary: Channel[Any],
+        primary: Channel[Message],
         counts: Association,
         with_odometry: bool,
-        held: Collection[Channel[Any]],
-        beside: Collection[Channel[Any]],
+        held: Collection[Channel[Message]],
+        beside: Collection[Channel[Message]],
     ) -> None:
         self._primary, self._counts = primary, counts
         self._odometry = OdometryBuffer() if with_odometry else None
@@ -75,7 +74,7 @@ class _Table:
         self._waiting: deque[Bundle] = deque()
         self._stamps: deque[int] = deque()  # of the bundles of the last moments, those that went included
 
-    def take(self, channel: Channel[Any], log_time_ns: int, message: Message) -> None:
+    def take(self, channel: Channel[Message], log_time_ns: int, message: Message) -> None:
         stamp_ns = getattr(message, "stamp_ns", 0) or log_time_ns
         if channel == self._primary:
             self._waiting.append(Bundle(stamp_ns, log_time_ns, {channel: message}))

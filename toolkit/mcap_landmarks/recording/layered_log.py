@@ -4,32 +4,10 @@ import heapq
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from mcap_landmarks.manifest import STAGE, StageRecord, stage_records
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
-
-
-class Readable(Protocol):
-    """Channels whose messages can be read in the order of time: an open recording is one, and a layered log."""
-
-    @property
-    def path(self) -> Path:
-        """Where the log lies, for messages to the user."""
-
-    @property
-    def channels(self) -> Sequence[ChannelSummary]:
-        """Every connection with its count."""
-
-    def messages(
-        self,
-        connections: Collection[Connection] | None = None,
-        start_ns: int | None = None,
-        end_ns: int | None = None,
-        progress: Progress | None = None,
-    ) -> Iterator[RawMessage]:
-        """See `Recording.messages`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,7 @@ from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from mcap import records
 from zstandard import ZstdCompressor
@@ -16,7 +16,7 @@ from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.channels import MAP, MAP_MARKERS, MAP_PATH, TF_STATIC, TRUTH_OBJECTS
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.manifest import CONTENT, RUN, STAGE, entry_text
-from mcap_landmarks.messages.codec import encode
+from mcap_landmarks.messages.codec import Message, encode
 from mcap_landmarks.messages.qos import KEY, qos_profile
 from mcap_landmarks.messages.typestore import definition
 from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, Opcode, serialize
@@ -146,7 +146,7 @@ class RecordingWriter:
         time_ns = stamped.log_time_ns
         self.write(RawMessage(connection, time_ns, time_ns, sequence, encode(stamped.message)))
 
-    def connection(self, channel: Channel[Any], stage: str = "") -> Connection:
+    def connection(self, channel: Channel[Message], stage: str = "") -> Connection:
         """The connection that messages of a channel of ours go to; that of results names their stage."""
         if (channel.topic, stage) not in self._own:
             ros_type = channel.message.ROS_TYPE

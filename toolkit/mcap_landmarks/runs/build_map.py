@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.channels import MAP_MARKERS, MAP_PATH, MAP_POSE
@@ -20,7 +19,8 @@ from mcap_landmarks.maps.model import LandmarkMap, Source
 from mcap_landmarks.messages.poses import Path as PathMessage
 from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.recording.writer import create_recording
-from mcap_landmarks.runs.bundles import Reading, inputs_of, read_bundles
+from mcap_landmarks.runs.bundles import inputs_of
+from mcap_landmarks.runs.needed_stages import missing_stages
 from mcap_landmarks.runs.output_writer import write_output
 from mcap_landmarks.runs.pipeline import check_output, told
 from mcap_landmarks.runs.plan import (
@@ -29,14 +29,14 @@ from mcap_landmarks.runs.plan import (
     choice_options,
     inputs_of_stage,
     is_result,
-    missing_stages,
     plan,
     record_of,
 )
 from mcap_landmarks.runs.session import Session, StageRun, open_session, part_file, parts_folder
-from mcap_landmarks.runs.stage_runner import bundle_count, counted, outcome_of
-from mcap_landmarks.stage import Reduction, Stamped, Watch, unwatched
-from mcap_landmarks.stages import find_stage
+from mcap_landmarks.runs.stage_input import StageInput
+from mcap_landmarks.runs.stage_runner import outcome_of
+from mcap_landmarks.stage import Config, Reduction, Stamped, Watch, unwatched
+from mcap_landmarks.stages.build_map import STAGE
 
 _LOGS = "logs"
 """The manifest's option with what came of each log: of the stages before, then of the map."""
@@ -98,7 +98,7 @@ def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
     Raises:
         ToolkitError: a log or file cannot be used, or what was seen is not enough for a map.
     """
-    stage, config = _reduction(), load("build_map", task.requests[0].settings)
+    stage, config = STAGE, load(STAGE.name, task.requests[0].settings)
     check_target(task.database)
     for recording, output in task.outputs.items():
         check_output(recording, output)
@@ -120,20 +120,15 @@ def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
     return dataclasses.replace(run, logs=tuple(written))
 
 
-def _reduction() -> Reduction:
-    stage = find_stage("build_map")
-    assert isinstance(stage, Reduction)  # noqa: S101 - build_map is the one reduction
-    return stage
-
-
-def _plan_log(place: str, stage: Reduction, config: Any, request: Request, task: MapTask, parts: Path) -> _LogPlan:
+def _plan_log(place: str, stage: Reduction, config: Config, request: Request, task: MapTask, parts: Path) -> _LogPlan:
     with open_session(request, parts, None) as session:
-        sensed = [channel for channel in stage.reads if not is_result(channel, request.span.choice)]
-        inputs_of(session.log.view(), sensed, sensed, request.span.choice)  # before hours are spent on the others
-        steps = tuple(plan(request, session.log, missing_stages(stage, session.log)))
-        options = choice_options(request.span.choice, stage.reads)
-        record = record_of(stage, config, task.files, inputs_of_stage(stage, session.log, steps), options)
-        return _LogPlan(place, request, session.log.recording.fingerprint(), steps, record)
+        log, choice = session.log, request.span.choice
+        sensed = [channel for channel in stage.reads if not is_result(channel, choice)]
+        inputs_of(log.without_results(), sensed, sensed, choice)  # before hours are spent on the other stages
+        steps = tuple(plan(request, log, missing_stages(stage, log, request.use)))
+        inputs, options = inputs_of_stage(stage, log, steps), choice_options(choice, stage.reads)
+        record = record_of(stage, config, task.files, inputs, options)
+        return _LogPlan(place, request, log.recording.fingerprint(), steps, record)
 
 
 def _check_each_once(plans: Sequence[_LogPlan]) -> None:
@@ -179,7 +174,7 @@ def _why(entries: Mapping[str, str], record: StageRecord) -> str:
 
 def _build(
     stage: Reduction,
-    config: Any,
+    config: Config,
     task: MapTask,
     plans: Sequence[_LogPlan],
     record: StageRecord,
@@ -231,25 +226,23 @@ def _found_by(logs: Sequence[MappedLog]) -> str:
 
 
 def _collect(
-    stage: Reduction, config: Any, session: Session, entry: _LogPlan, watch: Watch
+    stage: Reduction, config: Config, session: Session, entry: _LogPlan, watch: Watch
 ) -> tuple[LogObservations, Outcome]:
     """Observations of one log.
 
     Raises:
         RecordingError: it has no scene objects or no odometry, or none of its bundles has odometry.
     """
-    span, reading, view = session.request.span, Reading(), session.view(entry.record)
-    inputs = inputs_of(view, stage.reads, stage.reads, span.choice)
-    with watch(f"read {view.path.name}", bundle_count(stage, view, span), "bundles") as progress:
-        raws = counted(view.messages(tuple(inputs), span.start_ns, span.end_ns), inputs, stage.reads[0], progress)
-        observations = stage.collect(read_bundles(raws, inputs, stage.reads, reading), config)
-    reading.close(view.losses)
+    log = StageInput(stage, session.log_for(entry.record), session.request.span)
+    with watch(f"read {log.path.name}", log.count, "bundles") as progress:
+        observations = stage.collect(log.bundles(progress), config)
+    log.close()
     if not len(observations.stamps_ns):
         raise RecordingError(
-            f"{view.path}: none of {observations.bundles} bundles has odometry within 2 s; check that the clocks of "
+            f"{log.path}: none of {observations.bundles} bundles has odometry within 2 s; check that the clocks of "
             "odometry and scene objects agree"
         )
-    return dataclasses.replace(observations, fingerprint=entry.fingerprint), outcome_of(reading)
+    return dataclasses.replace(observations, fingerprint=entry.fingerprint), outcome_of(log.reading)
 
 
 def _write_part(record: StageRecord, landmark_map: LandmarkMap, trajectory: Trajectory, parts: Path) -> None:

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 from mcap_landmarks.channels import CAMERA_INFO, ODOMETRY, TF_STATIC
 from mcap_landmarks.errors import MessageError, RecordingError
@@ -13,9 +12,8 @@ from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage
 from mcap_landmarks.recording.association import Association, associate
-from mcap_landmarks.recording.layered_log import Readable
 from mcap_landmarks.recording.odometry_buffer import odometry_from
-from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage
+from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage, Readable
 
 HELD = (CAMERA_INFO, TF_STATIC)
 """Channels of which a bundle gets the latest message so far, however old."""
@@ -71,15 +69,15 @@ class Reading:
 
 
 def inputs_of(
-    recording: Readable, reads: Iterable[Channel[Any]], required: Iterable[Channel[Any]], choice: Choice
-) -> dict[Connection, Channel[Any]]:
+    recording: Readable, reads: Iterable[Channel[Message]], required: Iterable[Channel[Message]], choice: Choice
+) -> dict[Connection, Channel[Message]]:
     """The connections that a stage reads, each with the channel it stands for.
 
     Raises:
         RecordingError: a required input is missing or has no messages.
         UsageError: see `choose`.
     """
-    found: dict[Connection, Channel[Any]] = {}
+    found: dict[Connection, Channel[Message]] = {}
     counts = {entry.connection: entry.count for entry in recording.channels}
     needed = set(required)
     for channel in reads:
@@ -92,7 +90,7 @@ def inputs_of(
     return found
 
 
-def _missing(recording: Readable, channel: Channel[Any], empty: bool) -> str:
+def _missing(recording: Readable, channel: Channel[Message], empty: bool) -> str:
     role = ROLES.get(channel)
     if empty:
         name = role.name if role else channel.topic
@@ -109,8 +107,8 @@ def _missing(recording: Readable, channel: Channel[Any], empty: bool) -> str:
 
 def read_bundles(
     raws: Iterable[RawMessage],
-    inputs: Mapping[Connection, Channel[Any]],
-    reads: Sequence[Channel[Any]],
+    inputs: Mapping[Connection, Channel[Message]],
+    reads: Sequence[Channel[Message]],
     reading: Reading,
 ) -> Iterator[Bundle]:
     """The bundles of messages by log time, one per message of the first channel of `reads`.
@@ -124,7 +122,7 @@ def read_bundles(
     present = {*inputs.values()} | {TF_STATIC for entry in inputs if entry.message_type == TFMessage.ROS_TYPE}
     others = [channel for channel in reads[1:] if channel != ODOMETRY and channel in present]
     return associate(
-        _decoded(raws, inputs, reading),
+        decoded(raws, inputs, reading),
         reads[0],
         reading.association,
         with_odometry=ODOMETRY in reads,
@@ -134,7 +132,7 @@ def read_bundles(
 
 
 def held_before(
-    recording: Readable, inputs: Mapping[Connection, Channel[Any]], start_ns: int | None
+    recording: Readable, inputs: Mapping[Connection, Channel[Message]], start_ns: int | None
 ) -> Iterator[RawMessage]:
     """Messages of held inputs from before the time that reading starts at: transforms most often come only once."""
     held = [connection for connection, channel in inputs.items() if channel in HELD]
@@ -142,9 +140,10 @@ def held_before(
         yield from recording.messages(held, None, start_ns)
 
 
-def _decoded(
-    raws: Iterable[RawMessage], inputs: Mapping[Connection, Channel[Any]], reading: Reading
-) -> Iterator[tuple[Channel[Any], int, Message]]:
+def decoded(
+    raws: Iterable[RawMessage], inputs: Mapping[Connection, Channel[Message]], reading: Reading
+) -> Iterator[tuple[Channel[Message], int, Message]]:
+    """The messages of inputs with their channels and log times; odometry also as such, whatever message carries it."""
     for raw in raws:
         channel = inputs.get(raw.connection)
         if channel is None:

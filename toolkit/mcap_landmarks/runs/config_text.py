@@ -3,9 +3,9 @@
 import json
 import re
 from collections.abc import Mapping
-from typing import Any
 
 from pydantic import TypeAdapter
+from pydantic.json_schema import JsonSchemaValue
 
 from mcap_landmarks.config import Settings, declaration, effective, stage_config
 from mcap_landmarks.sources import source_names
@@ -14,7 +14,7 @@ from mcap_landmarks.stages import stage_names
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def everything(settings: Settings) -> dict[str, dict[str, Any]]:
+def everything(settings: Settings) -> dict[str, dict[str, object]]:
     """Every key of every stage and source that has any, with the value in force; None is unset."""
     found = {}
     for name in (*stage_names(), *source_names()):
@@ -27,7 +27,7 @@ def everything(settings: Settings) -> dict[str, dict[str, Any]]:
     return found
 
 
-def toml(tables: Mapping[str, Mapping[str, Any]]) -> str:
+def toml(tables: Mapping[str, Mapping[str, object]]) -> str:
     """Tables as TOML that reads back as they are; TOML has no null, so that what is unset is a comment."""
     lines: list[str] = []
     for name, table in tables.items():
@@ -48,7 +48,7 @@ def _key(text: str) -> str:
     return text if _BARE.fullmatch(text) else json.dumps(text, ensure_ascii=False)
 
 
-def _value(value: Any) -> str:
+def _value(value: object) -> str:
     if isinstance(value, Mapping):
         inside = ", ".join(f"{_key(key)} = {_value(one)}" for key, one in value.items() if one is not None)
         return f"{{{inside}}}"
@@ -59,7 +59,7 @@ def _value(value: Any) -> str:
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
-def json_schema() -> dict[str, Any]:
+def json_schema() -> JsonSchemaValue:
     """JSON schema of a configuration file."""
     made = {name: declaration(name) for name in (*stage_names(), *source_names())}
     adapters = [(name, "validation", TypeAdapter(entry.config)) for name, entry in made.items()]
@@ -84,7 +84,7 @@ def json_schema() -> dict[str, Any]:
     }
 
 
-def _closed(schema: dict[str, Any]) -> dict[str, Any]:
+def _closed(schema: JsonSchemaValue) -> JsonSchemaValue:
     """A dataclass's schema with no other keys, and its docstring on one line."""
     closed = {**schema, "additionalProperties": False} if "properties" in schema else schema
     if "description" in closed:

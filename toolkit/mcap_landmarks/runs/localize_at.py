@@ -6,17 +6,18 @@ import tempfile
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from mcap_landmarks.channels import MATCH, POSE, POSE_COVARIANCE
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.match import LandmarkMatch
 from mcap_landmarks.recording.association import WINDOW_NS
-from mcap_landmarks.runs.bundles import Reading, inputs_of, read_bundles
-from mcap_landmarks.runs.plan import Request, Step, missing_stages, plan
+from mcap_landmarks.runs.bundles import Reading
+from mcap_landmarks.runs.needed_stages import missing_stages
+from mcap_landmarks.runs.plan import Request, Step, plan
 from mcap_landmarks.runs.session import Session, open_session
-from mcap_landmarks.runs.stage_runner import bundle_count, counted, naming
+from mcap_landmarks.runs.stage_input import StageInput
+from mcap_landmarks.runs.stage_runner import naming
 from mcap_landmarks.stage import Omission, Stamped, Watch, unwatched
 from mcap_landmarks.stages import find_stage
 
@@ -48,7 +49,7 @@ def localize_at(request: Request, time_ns: int, watch: Watch = unwatched) -> tup
     with tempfile.TemporaryDirectory(prefix="mcap-landmarks-") as folder:
         parts = Path(folder)
         with open_session(request, parts, None) as session:
-            before = missing_stages(find_stage(_LOCALIZE), session.log)
+            before = missing_stages(find_stage(_LOCALIZE), session.log, request.use)
             if set(before) <= set(session.log.results):
                 return _localized(session, before, time_ns, watch)
         end_ns = time_ns + 2 * WINDOW_NS
@@ -61,9 +62,9 @@ def _localized(session: Session, before: list[str], time_ns: int, watch: Watch) 
     *steps, last = plan(session.request, session.log, [*before, _LOCALIZE])
     for step in steps:
         session.work(step, watch)
-    reading = Reading()
+    log = StageInput(last.stage, session.log_for(last.record), session.request.span)
     nearest: Answer | None = None
-    with contextlib.closing(_results(session, last, reading, watch)) as results:
+    with contextlib.closing(_results(last, log, watch)) as results:
         for answer in _answers(results):
             if nearest is None or abs(answer.stamp_ns - time_ns) < abs(nearest.stamp_ns - time_ns):
                 nearest = answer
@@ -72,21 +73,15 @@ def _localized(session: Session, before: list[str], time_ns: int, watch: Watch) 
     if nearest is None or abs(nearest.stamp_ns - time_ns) > WINDOW_NS:
         known = "there is none at all" if nearest is None else f"the nearest is at {nearest.stamp_ns}"
         raise UsageError(f"{session.log.path}: no bundle within 2 s of {time_ns}; {known}")
-    return nearest, reading
+    return nearest, log.reading
 
 
-def _results(session: Session, step: Step, reading: Reading, watch: Watch) -> Generator[Stamped | Omission, None, None]:
-    view, span = session.view(step.record), session.request.span
-    inputs = inputs_of(view, step.stage.reads, step.stage.reads[:1], span.choice)
-    count = bundle_count(step.stage, view, span)
-    with watch(f"{step.stage.name} {view.path.name}", count, "bundles") as progress:
-        raws = view.messages(tuple(inputs), span.start_ns, span.end_ns)
-        raws = counted(raws, inputs, step.stage.reads[0], progress)
-        bundles = read_bundles(raws, inputs, step.stage.reads, reading)
+def _results(step: Step, log: StageInput, watch: Watch) -> Generator[Stamped | Omission, None, None]:
+    with watch(f"{step.stage.name} {log.path.name}", log.count, "bundles") as progress:
         try:
-            yield from naming(view.path, step.stage.process(bundles, step.config, step.files))
+            yield from naming(log.path, step.stage.process(log.bundles(progress), step.config, step.files))
         finally:
-            reading.close(view.losses)
+            log.close()
 
 
 def _answers(results: Iterator[Stamped | Omission]) -> Iterator[Answer]:
@@ -95,14 +90,13 @@ def _answers(results: Iterator[Stamped | Omission]) -> Iterator[Answer]:
     for result in results:
         if isinstance(result, Omission):
             continue
-        message: Any = result.message
-        if result.channel == MATCH:
+        if match := result.get(MATCH):
             if answer is not None:
                 yield answer
-            answer = Answer(message.stamp_ns or result.log_time_ns, message)
-        elif answer is not None and result.channel == POSE:
-            answer.pose = message.pose
-        elif answer is not None and result.channel == POSE_COVARIANCE:
-            answer.covariance = message.planar_covariance
+            answer = Answer(match.stamp_ns or result.log_time_ns, match)
+        elif answer is not None and (pose := result.get(POSE)):
+            answer.pose = pose.pose
+        elif answer is not None and (posed := result.get(POSE_COVARIANCE)):
+            answer.covariance = posed.planar_covariance
     if answer is not None:
         yield answer

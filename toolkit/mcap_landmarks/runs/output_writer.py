@@ -36,8 +36,7 @@ def write_output(
     Raises:
         ToolkitError: the output cannot be written; nothing is left behind.
     """
-    results, stale = session.kept_results()
-    notes = [f"{name}'s results in the log were made from results that changed; they are left out" for name in stale]
+    results, notes = session.kept_results()
     request, source = session.request, session.log.recording
     fingerprint = narrowed(session.log.fingerprint, results_only=request.results_only)
     cut = (request.span.start_ns, request.span.end_ns) != (None, None)

@@ -7,8 +7,9 @@ from pathlib import Path
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.manifest import Outcome
+from mcap_landmarks.runs.needed_stages import in_order, missing_stages
 from mcap_landmarks.runs.output_writer import write_output
-from mcap_landmarks.runs.plan import Request, in_order, missing_stages, plan
+from mcap_landmarks.runs.plan import Request, plan
 from mcap_landmarks.runs.session import StageRun, open_session, parts_folder
 from mcap_landmarks.stage import Watch, unwatched
 from mcap_landmarks.stages import find_stage
@@ -50,7 +51,8 @@ def run_stages(
     check_output(request.recording, output)
     with parts_folder(output) as parts, open_session(request, parts, output) as session:
         if lacking:
-            before = [other for name in names for other in missing_stages(find_stage(name), session.log)]
+            use = (*request.use, *names)
+            before = [other for name in names for other in missing_stages(find_stage(name), session.log, use)]
             names = in_order([*before, *names])
         runs = [session.work(step, watch) for step in plan(request, session.log, names)]
         notes, losses = write_output(session, output, verb, [session.log.recording.fingerprint()], watch)

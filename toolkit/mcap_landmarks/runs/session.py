@@ -7,13 +7,15 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mcap_landmarks.channels import TF
+from mcap_landmarks.channels import SHARED
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.manifest import Outcome, StageRecord
 from mcap_landmarks.recording.layered_log import Layer, LayeredLog, result_layers
 from mcap_landmarks.recording.reader import Recording, open_recording
-from mcap_landmarks.runs.plan import Log, Request, Step
-from mcap_landmarks.runs.stage_runner import bundle_count, run_stage
+from mcap_landmarks.runs.plan import Request, Step
+from mcap_landmarks.runs.recorded_log import RecordedLog
+from mcap_landmarks.runs.stage_input import StageInput
+from mcap_landmarks.runs.stage_runner import run_stage
 from mcap_landmarks.stage import Watch
 
 
@@ -66,14 +68,14 @@ def open_session(request: Request, parts: Path, output: Path | None) -> Iterator
         RecordingError: the log cannot be read.
     """
     with ExitStack() as stack:
-        log = Log(stack.enter_context(open_recording(request.recording)), request.span)
+        log = RecordedLog(stack.enter_context(open_recording(request.recording)), request.span)
         yield Session(stack, request, log, parts, output)
 
 
 class Session:
     """One log and its results so far; made by `open_session`."""
 
-    def __init__(self, stack: ExitStack, request: Request, log: Log, parts: Path, output: Path | None) -> None:
+    def __init__(self, stack: ExitStack, request: Request, log: RecordedLog, parts: Path, output: Path | None) -> None:
         self.request, self.log = request, log
         self.results = dict(log.results)
         self.of_this_run: set[str] = set()
@@ -85,8 +87,8 @@ class Session:
                 self.earlier = self._open(output)
                 self._stores.append(("the earlier output", result_layers(self.earlier)))
 
-    def view(self, record: StageRecord) -> LayeredLog:
-        """What a stage sees: the log, with the results that its record says it reads."""
+    def log_for(self, record: StageRecord) -> LayeredLog:
+        """What a stage can read: the log, with the results that its record says it reads."""
         read = [self.results[name] for name in sorted(record.inputs) if name in self.results]
         topics = {entry.connection.topic for layer in read for entry in layer.channels}
         return LayeredLog(self.log.path, [self.own_without(topics), *read])
@@ -96,12 +98,13 @@ class Session:
         found = None if self.request.force else self.find(step.record)
         if found is not None:
             return found
-        reason, (stage, span) = self._why(step.record), (step.stage, self.request.span)
-        view, target = self.view(step.record), part_file(self._parts, step.record)
-        with watch(f"{stage.name} {self.log.path.name}", bundle_count(stage, view, span), "bundles") as progress:
-            record = run_stage(step, view, span, self.request.thinning, target, progress)
-        self.take(target)
-        return StageRun(stage.name, "ran", reason, record.outcome)
+        name, reason = step.stage.name, self._why(step.record)
+        target = part_file(self._parts, step.record)
+        log = StageInput(step.stage, self.log_for(step.record), self.request.span)
+        with watch(f"{name} {self.log.path.name}", log.count, "bundles") as progress:
+            record = run_stage(step, log, self.request.thinning, target, progress)
+        self._show(result_layers(self._open(target)))
+        return StageRun(name, "ran", reason, record.outcome)
 
     def find(self, record: StageRecord) -> StageRun | None:
         """The results with the key of a record, taken from where they lie; None if they lie nowhere."""
@@ -121,36 +124,27 @@ class Session:
                 return result_layers(self._open(path))
         return {}
 
-    def take(self, part: Path) -> None:
-        """Show the results in a part to the next stages."""
-        self._show(result_layers(self._open(part)))
-
     def kept_results(self) -> tuple[list[Layer], list[str]]:
-        """The results for an output, by stage, and the stages whose results are left out.
+        """The results for an output, by stage, and what is to be said of those that are left out.
 
-        These are such as were made from results that are not the ones for the output. Where only results are asked for,
-        those of the run's own stages are meant.
+        These are such as were made from results that are not the ones for the output, and such as lie on a topic that a
+        stage of the run writes. Where only results are asked for, those of the run's own stages are meant.
         """
-        kept, stale = dict(sorted(self.results.items())), list[str]()
+        kept = dict(sorted(self.results.items()))
         if self.request.results_only:
             kept = {name: layer for name, layer in kept.items() if name in self.of_this_run}
-        while True:
-            keys = {name: layer.record.key for name, layer in kept.items() if layer.record is not None}
-            wrong = [
-                name
-                for name, layer in kept.items()
-                if layer.record is not None
-                and any(source in stale or keys.get(source, key) != key for source, key in layer.record.inputs.items())
-            ]
-            if not wrong:
-                return list(kept.values()), stale
-            stale += wrong
-            for name in wrong:
-                del kept[name]
+        notes = {
+            name: f"{name}'s results in the log are on topics that {writer} writes; they are left out"
+            for name, writer in _replaced(kept, self.of_this_run).items()
+        }
+        while stale := _stale(kept, notes):
+            left_out = "results in the log were made from results that changed; they are left out"
+            notes.update({name: f"{name}'s {left_out}" for name in stale})
+        return [layer for name, layer in kept.items() if name not in notes], list(notes.values())
 
     def own_without(self, topics: Collection[str]) -> Layer:
-        """The log's own messages, without those on topics that results are on; transforms stand beside each other."""
-        own, gone = self.log.own, {*topics} - {TF.topic}
+        """The log's own messages, without those on topics that results are on instead."""
+        own, gone = self.log.own, {*topics} - SHARED
         return replace(own, channels=tuple(entry for entry in own.channels if entry.connection.topic not in gone))
 
     def _show(self, layers: Mapping[str, Layer]) -> None:
@@ -171,3 +165,30 @@ class Session:
                     return f"the results in {place} are only a part"
                 return f"{record.difference(layer.record)} since the results in {place}"
         return "there were no results"
+
+
+def _replaced(layers: Mapping[str, Layer], of_this_run: Collection[str]) -> dict[str, str]:
+    """The stages with results on a topic that a stage of this run writes, with that one: a topic has one writer."""
+    writers = {topic: name for name in of_this_run if name in layers for topic in _topics(layers[name])}
+    return {
+        name: writers[topic]
+        for name, layer in layers.items()
+        if name not in of_this_run
+        for topic in _topics(layer)
+        if topic in writers
+    }
+
+
+def _topics(layer: Layer) -> set[str]:
+    return {entry.connection.topic for entry in layer.channels} - SHARED
+
+
+def _stale(layers: Mapping[str, Layer], gone: Collection[str]) -> list[str]:
+    """The stages whose results were made from results that are gone, or are not the ones that are there."""
+    there = {name: layer.record for name, layer in layers.items() if name not in gone and layer.record is not None}
+    keys = {name: record.key for name, record in there.items()}
+    return [
+        name
+        for name, record in there.items()
+        if any(source in gone or keys.get(source, key) != key for source, key in record.inputs.items())
+    ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
+from mcap_landmarks.stage import ChannelSummary, Config, Connection, Progress, RawMessage
 
 Payload = bytes | memoryview
 
@@ -93,7 +93,7 @@ class Source:
 
     name: str
     reads: str
-    config: type[Any]
+    config: type[Config]
     recognises: Callable[[Path], bool]
     open: Callable[[Path, Any], AbstractContextManager[Sequence[SourceLog]]]
 

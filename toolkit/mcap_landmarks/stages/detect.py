@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from mcap_landmarks.channels import ANNOTATIONS, CAMERA_IMAGE, DETECTIONS
+from mcap_landmarks.channels import ANNOTATIONS, CAMERA_IMAGE, DETECTIONS, annotations_topic
 from mcap_landmarks.errors import MessageError, RecordingError, UsageError
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CompressedImage, Image
+from mcap_landmarks.resources import detector
 from mcap_landmarks.stage import Bundle, Omission, Stage, Stamped
 from mcap_landmarks.vision.annotations import annotations
 from mcap_landmarks.vision.classifier import Classifier, open_classifier
@@ -244,7 +245,10 @@ STAGE = Stage(
     writes=(DETECTIONS, ANNOTATIONS),
     config=DetectConfig,
     process=process,
+    thinned=True,
+    places={ANNOTATIONS: annotations_topic},
     resources=("model",),
     options=("names", "classifier"),
+    bundled={"model": detector},
     tolerance={"box_xyxy_px": 0.5, "score": 1e-4, "others.score": 1e-4, "points.points": 0.5, "texts.position": 0.5},
 )

@@ -11,11 +11,13 @@ import numpy as np
 from mcap_landmarks.channels import (
     MAP,
     MATCH,
+    ODOM_FRAME,
     ODOMETRY,
     POSE,
     POSE_COVARIANCE,
     SCENE_OBJECTS,
     TF,
+    TF_STATIC,
 )
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.frames import plain
@@ -29,11 +31,12 @@ from mcap_landmarks.localization.validation import check_map
 from mcap_landmarks.maps.database import read_map, read_neighbours
 from mcap_landmarks.maps.map_message import scene_from_map
 from mcap_landmarks.maps.model import LandmarkMap
+from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.match import Status
 from mcap_landmarks.messages.poses import PoseStamped, PoseWithCovarianceStamped
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
-from mcap_landmarks.stage import Bundle, OdometryAt, Omission, Stage, Stamped, Tolerance
+from mcap_landmarks.stage import Bundle, InputLog, LeftOut, OdometryAt, Omission, Stage, Stamped, Tolerance
 
 # Bundles that are solved together, or calibrated from; what follows the robot takes them one by one.
 _BATCH, _FOLLOWED = 4096, 64
@@ -143,12 +146,35 @@ def _messages(bundle: Bundle, match: Match, frame: str, config: LocalizeConfig) 
         yield Stamped(TF, bundle.log_time_ns, TFMessage((transform,)))
 
 
+def _transforms_topic(log: InputLog, config: LocalizeConfig) -> str | LeftOut:
+    """/tf, unless the frame of odometry has a parent there already: a frame has one parent only."""
+    if config.tf == "never":
+        return TF.topic
+    odometry = log.first(ODOMETRY)
+    frame = ODOM_FRAME if odometry is None else plain(odometry.frame_id) or ODOM_FRAME
+    if _has_parent(log, frame):
+        return LeftOut(f"{frame} has a parent frame already; no map -> {frame} transform is written")
+    return TF.topic
+
+
+def _has_parent(log: InputLog, frame: str) -> bool:
+    topics = {TF.topic, TF_STATIC.topic}
+    name = frame.encode() + b"\0"
+    for raw in log.messages([entry.connection for entry in log.channels if entry.connection.topic in topics]):
+        if name in bytes(raw.data):  # decode only what can have it as child
+            message = decode(TF.message, raw.data)
+            if any(plain(transform.child_frame_id) == frame for transform in message.transforms):
+                return True
+    return False
+
+
 STAGE = Stage(
     "localize",
     reads=(SCENE_OBJECTS, ODOMETRY),
     writes=(MAP, MATCH, POSE, POSE_COVARIANCE, TF),
     config=LocalizeConfig,
     process=process,
+    places={TF: _transforms_topic},
     resources=("map",),
     tolerance={
         "position_m": 1e-6,
