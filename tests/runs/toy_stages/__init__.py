@@ -1,0 +1,1 @@
+"""Stages that tests put beside those of the toolkit."""
