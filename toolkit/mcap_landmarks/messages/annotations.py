@@ -1,11 +1,12 @@
 """ImageAnnotations: outlines and texts that Foxglove draws over an image."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from mcap_landmarks.messages.parts import Array, make, stamp_from_ros, stamp_to_ros
+from mcap_landmarks.messages.typestore import RosObject
 
 Color = tuple[float, float, float, float]
 _LINE_LOOP = 2
@@ -41,7 +42,7 @@ class ImageAnnotations:
     outlines: tuple[Outline, ...]
     labels: tuple[Label, ...]
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         stamp = stamp_to_ros(self.stamp_ns)
         points = [
@@ -72,7 +73,7 @@ class ImageAnnotations:
         return make("foxglove_msgs/ImageAnnotations", circles=[], points=points, texts=texts)
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`; annotations without any outline or label have the stamp 0."""
         stamps = [item.timestamp for item in (*ros.points, *ros.texts)]
         outlines = tuple(
@@ -96,14 +97,14 @@ class ImageAnnotations:
         return cls(stamp_from_ros(stamps[0]) if stamps else 0, outlines, labels)
 
 
-def _point(u: float, v: float) -> Any:
+def _point(u: float, v: float) -> RosObject:
     return make("foxglove_msgs/Point2", x=u, y=v)
 
 
-def _color(rgba: Color) -> Any:
+def _color(rgba: Color) -> RosObject:
     r, g, b, a = rgba
     return make("foxglove_msgs/Color", r=r, g=g, b=b, a=a)
 
 
-def _rgba(color: Any) -> Color:
+def _rgba(color: RosObject) -> Color:
     return color.r, color.g, color.b, color.a

@@ -1,24 +1,24 @@
 """Message dataclasses to CDR bytes and back."""
 
 from struct import error as struct_error
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from typing import ClassVar, Protocol, Self, TypeVar
 
 from rosbags.serde import SerdeError
 
 from mcap_landmarks.errors import MessageError
-from mcap_landmarks.messages.typestore import typestore
+from mcap_landmarks.messages.typestore import RosObject, typestore
 
 
 class Message(Protocol):
-    """What every message dataclass offers; `Any` is a message object of the rosbags typestore."""
+    """What every message dataclass offers."""
 
     ROS_TYPE: ClassVar[str]
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """Give the same content as an object of the typestore."""
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """Take the content of an object of the typestore."""
 
 

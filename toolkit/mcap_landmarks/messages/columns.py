@@ -46,7 +46,7 @@ class Table:
 class Numbers:
     """Numbers of one scalar type: `count` a row, in several fields, or (None) as many as the row says."""
 
-    dtype: np.dtype[Any]
+    dtype: np.dtype[np.number]
     count: int | None
     width: int = 1
     fields: list[tuple[str, Kind, int, int]] = field(default_factory=list)

@@ -1,12 +1,13 @@
 """Detections: boxes in an image, carried as vision_msgs/Detection2DArray."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from mcap_landmarks.messages.hypotheses import Hypotheses, hypotheses_from_ros, place_to_ros, results_to_ros
 from mcap_landmarks.messages.parts import Array, header_to_ros, make, stamp_from_ros
+from mcap_landmarks.messages.typestore import RosObject
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,7 +25,7 @@ class Detections:
     def __len__(self) -> int:
         return len(self.ids)
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         header = header_to_ros(self.stamp_ns, self.frame_id)
         nowhere = place_to_ros(np.zeros(2), np.zeros((2, 2)))
@@ -37,7 +38,7 @@ class Detections:
         return make("vision_msgs/Detection2DArray", header=header, detections=detections)
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         boxes = np.zeros((len(ros.detections), 4))
         for i, detection in enumerate(ros.detections):
@@ -56,7 +57,7 @@ class Detections:
         )
 
 
-def _box_to_ros(box_xyxy: Array) -> Any:
+def _box_to_ros(box_xyxy: Array) -> RosObject:
     x1, y1, x2, y2 = box_xyxy.tolist()
     centre = make("vision_msgs/Point2D", x=(x1 + x2) / 2, y=(y1 + y2) / 2)
     pose = make("vision_msgs/Pose2D", position=centre, theta=0.0)

@@ -1,11 +1,11 @@
 """What objects could be, and objects in the plane, as vision_msgs carries them."""
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
 from mcap_landmarks.messages.parts import Array, make, pose_to_ros, pose_with_covariance_to_ros
+from mcap_landmarks.messages.typestore import RosObject
 
 Hypotheses = tuple[tuple[str, float], ...]
 """Class names with their probabilities."""
@@ -13,14 +13,14 @@ Hypotheses = tuple[tuple[str, float], ...]
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
 
-def place_to_ros(position_xy: Array, covariance: Array) -> Any:
+def place_to_ros(position_xy: Array, covariance: Array) -> RosObject:
     """A `geometry_msgs/PoseWithCovariance` of a place (2,) with its covariance (2, 2); the rest of both is zero."""
     spread = np.zeros((6, 6))
     spread[:2, :2] = covariance
     return pose_with_covariance_to_ros((*position_xy.tolist(), 0.0), _UPRIGHT, spread)
 
 
-def results_to_ros(hypotheses: Iterable[tuple[str, float]], places: Iterable[Any]) -> list[Any]:
+def results_to_ros(hypotheses: Iterable[tuple[str, float]], places: Iterable[RosObject]) -> list[RosObject]:
     """A `vision_msgs/ObjectHypothesisWithPose` for each hypothesis, with its place."""
     return [
         make(
@@ -32,12 +32,14 @@ def results_to_ros(hypotheses: Iterable[tuple[str, float]], places: Iterable[Any
     ]
 
 
-def hypotheses_from_ros(detection: Any) -> Hypotheses:
+def hypotheses_from_ros(detection: RosObject) -> Hypotheses:
     """The class names and probabilities of a detection's results, in their order."""
     return tuple((result.hypothesis.class_id, float(result.hypothesis.score)) for result in detection.results)
 
 
-def object_to_ros(header: Any, identity: str, results: list[Any], middle_xy: Iterable[float], size_m: float) -> Any:
+def object_to_ros(
+    header: RosObject, identity: str, results: list[RosObject], middle_xy: Iterable[float], size_m: float
+) -> RosObject:
     """A `vision_msgs/Detection3D` in a box as long as it is wide."""
     box = make(
         "vision_msgs/BoundingBox3D",

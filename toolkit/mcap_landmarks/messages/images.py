@@ -1,11 +1,12 @@
 """Image, CompressedImage and CameraInfo."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from mcap_landmarks.messages.parts import Array, header_to_ros, make, stamp_from_ros
+from mcap_landmarks.messages.typestore import RosObject
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,7 +20,7 @@ class CompressedImage:
     format: str
     data: bytes
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         return make(
             "sensor_msgs/CompressedImage",
@@ -29,7 +30,7 @@ class CompressedImage:
         )
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         return cls(stamp_from_ros(ros.header.stamp), ros.header.frame_id, ros.format, ros.data.tobytes())
 
@@ -49,7 +50,7 @@ class Image:
     step: int
     data: bytes
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         return make(
             "sensor_msgs/Image",
@@ -63,7 +64,7 @@ class Image:
         )
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         return cls(
             stamp_from_ros(ros.header.stamp),
@@ -93,7 +94,7 @@ class CameraInfo:
     rectification: Array
     projection: Array
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         whole = make("sensor_msgs/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
         return make(
@@ -112,7 +113,7 @@ class CameraInfo:
         )
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         return cls(
             stamp_from_ros(ros.header.stamp),

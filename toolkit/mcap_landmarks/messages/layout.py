@@ -19,7 +19,9 @@ _SCALARS = {
 }  # fmt: skip
 _MOMENTS = frozenset({"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"})
 _LITTLE_ENDIAN = b"\x00\x01"
-_Flat = tuple[np.dtype[Any], int, Kind]
+FieldType = Any  # of rosbags: (kind, content), nested
+Definition = Mapping[str, list[tuple[str, FieldType]]]
+_Flat = tuple[np.dtype[np.number], int, Kind]
 
 
 class Layout:
@@ -36,7 +38,7 @@ class Layout:
         self._type = ros_type
         try:
             types = get_types_from_msg(schema, ros_type)
-            self.definition: Mapping[str, Any] = {name: fields for name, (_, fields) in types.items()}
+            self.definition: Definition = {name: fields for name, (_, fields) in types.items()}
             parts = self._rows().parts
         except (TypesysError, KeyError, RecursionError) as error:
             reason = error or type(error).__name__
@@ -79,7 +81,7 @@ def _read(rows: Rows, data: bytes) -> None:
         raise MessageError(f"{len(data)} bytes do not fit the schema")
 
 
-def _add(rows: Rows, types: Mapping[str, Any], node: Any, path: str) -> None:
+def _add(rows: Rows, types: Definition, node: FieldType, path: str) -> None:
     """Add a field, or all fields of a message type."""
     sort, detail = node
     if sort in {Nodetype.ARRAY, Nodetype.SEQUENCE}:
@@ -96,7 +98,7 @@ def _add(rows: Rows, types: Mapping[str, Any], node: Any, path: str) -> None:
             _add(rows, types, inner, f"{path}.{name}" if path else name)
 
 
-def _add_many(rows: Rows, types: Mapping[str, Any], element: Any, path: str, count: int | None) -> None:
+def _add_many(rows: Rows, types: Definition, element: FieldType, path: str, count: int | None) -> None:
     flat = _flat(types, element)
     if flat and count is not None:
         dtype, width, _ = flat
@@ -124,7 +126,7 @@ def _add_numbers(rows: Rows, flat: _Flat, path: str) -> None:
     last.fields.append((path, kind, start, last.count))
 
 
-def _flat(types: Mapping[str, Any], node: Any) -> _Flat | None:
+def _flat(types: Definition, node: FieldType) -> _Flat | None:
     """Scalar type, width and kind of a number or of a message of numbers of one type."""
     sort, detail = node
     if sort == Nodetype.BASE:

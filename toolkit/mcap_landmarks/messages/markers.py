@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from mcap_landmarks.messages.parts import (
     pose_to_ros,
     stamp_from_ros,
 )
+from mcap_landmarks.messages.typestore import RosObject
 
 
 class Shape(IntEnum):
@@ -51,7 +52,7 @@ class MarkerArray:
     markers: tuple[Marker, ...]
     replaces: bool = False
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         header = header_to_ros(self.stamp_ns, self.frame_id)
         first = [_to_ros(header, _ALL, _DELETE_ALL)] if self.replaces else []
@@ -60,7 +61,7 @@ class MarkerArray:
         )
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`; an empty array has the stamp 0 and no frame."""
         if not ros.markers:
             return cls(0, "", ())
@@ -73,7 +74,7 @@ _ADD, _DELETE_ALL = 0, 3
 _ALL = Marker("", 0, Shape.CYLINDER, np.zeros(3), np.zeros(3), (0.0, 0.0, 0.0, 0.0))
 
 
-def _to_ros(header: Any, marker: Marker, action: int = _ADD) -> Any:
+def _to_ros(header: RosObject, marker: Marker, action: int = _ADD) -> RosObject:
     r, g, b, a = marker.color
     nothing = np.zeros(0, dtype=np.uint8)
     return make(
@@ -100,7 +101,7 @@ def _to_ros(header: Any, marker: Marker, action: int = _ADD) -> Any:
     )
 
 
-def _from_ros(ros: Any) -> Marker:
+def _from_ros(ros: RosObject) -> Marker:
     return Marker(
         ros.ns,
         ros.id,

@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from mcap_landmarks.messages.parts import Array, header_to_ros, make, stamp_from_ros
+from mcap_landmarks.messages.typestore import RosObject
 
 
 class Status(IntEnum):
@@ -43,7 +44,7 @@ class LandmarkMatch:
     dof: int = 0
     bundles_joined: int = 1
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         return make(
             "mcap_landmarks_msgs/LandmarkMatch",
@@ -61,7 +62,7 @@ class LandmarkMatch:
         )
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         return cls(
             stamp_from_ros(ros.header.stamp),

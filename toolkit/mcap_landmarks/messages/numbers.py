@@ -1,9 +1,10 @@
 """std_msgs/UInt8."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 from mcap_landmarks.messages.parts import make
+from mcap_landmarks.messages.typestore import RosObject
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,11 +15,11 @@ class UInt8:
 
     data: int
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         return make("std_msgs/UInt8", data=self.data)
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         return cls(int(ros.data))

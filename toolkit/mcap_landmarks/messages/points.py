@@ -1,13 +1,14 @@
 """PointCloud2: only where its points are, and when each was measured."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.messages.parts import header_to_ros, make, stamp_from_ros
+from mcap_landmarks.messages.typestore import RosObject
 
 _INT32, _UINT32, _FLOAT32, _FLOAT64 = 5, 6, 7, 8
 _PLACES = {_FLOAT32: "f4", _FLOAT64: "f8"}
@@ -40,7 +41,7 @@ class PointCloud2:
         """How long the sweep took; 0 where the cloud does not say."""
         return 0 if self.times_ns is None or not len(self.times_ns) else int(np.ptp(self.times_ns))
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`; one row of points with fields x, y and z, and t where times are known."""
         names = "xyz" if self.times_ns is None else "xyzt"
         points = np.zeros(len(self.points_m), [(name, "<i4" if name == "t" else "<f4") for name in names])
@@ -68,7 +69,7 @@ class PointCloud2:
         )
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`; whatever else a point has is left out.
 
         Raises:
@@ -94,22 +95,18 @@ class PointCloud2:
         return cls(stamp_ns, ros.header.frame_id, xyz, times_ns)
 
 
-def _points(ros: Any, layout: dict[str, str], offsets: list[int]) -> NDArray[Any]:
+def _points(ros: RosObject, layout: dict[str, str], offsets: list[int]) -> NDArray[np.void]:
     """The points of a cloud of the typestore, one after the other, with the fields of a layout."""
-    point: Any = {
-        "names": list(layout),
-        "formats": list(layout.values()),
-        "offsets": offsets,
-        "itemsize": ros.point_step,
-    }
+    names, formats = list(layout), list(layout.values())
+    point = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": int(ros.point_step)})
     rows = np.ascontiguousarray(ros.data).reshape(-1)
     if len(rows) < ros.height * ros.row_step or ros.row_step < ros.width * ros.point_step:
         raise MessageError(f"a point cloud of {ros.width} x {ros.height} points has {len(rows)} bytes only")
     rows = rows[: ros.height * ros.row_step].reshape(ros.height, -1)[:, : ros.width * ros.point_step]
-    return np.frombuffer(np.ascontiguousarray(rows).data, dtype=np.dtype(point))
+    return np.frombuffer(np.ascontiguousarray(rows).data, dtype=point)
 
 
-def _times_ns(values: NDArray[Any], returned: NDArray[np.bool_], stamp_ns: int) -> NDArray[np.int64] | None:
+def _times_ns(values: NDArray[np.number], returned: NDArray[np.bool_], stamp_ns: int) -> NDArray[np.int64] | None:
     """Times (N,) after the stamp, zero where nothing returned; None where it is not clear what the values mean."""
     readings = [np.where(returned, values, 0).astype(np.float64)]
     if values.dtype.kind == "f":

@@ -1,7 +1,7 @@
 """PoseStamped, PoseWithCovarianceStamped, Path and Odometry."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +22,7 @@ from mcap_landmarks.messages.parts import (
     spread_planar,
     stamp_from_ros,
 )
+from mcap_landmarks.messages.typestore import RosObject
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +46,7 @@ class PoseStamped:
         """x, y, heading (3,)."""
         return planar_pose(self.position_m, self.orientation_xyzw)
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         header = header_to_ros(self.stamp_ns, self.frame_id)
         return make(
@@ -53,7 +54,7 @@ class PoseStamped:
         )
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         pose = ros.pose
         return cls(
@@ -91,7 +92,7 @@ class PoseWithCovarianceStamped:
         """Covariance (3, 3) of x, y, heading."""
         return self.covariance[PLANAR]
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         return make(
             "geometry_msgs/PoseWithCovarianceStamped",
@@ -100,7 +101,7 @@ class PoseWithCovarianceStamped:
         )
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         pose = ros.pose.pose
         return cls(
@@ -122,13 +123,13 @@ class Path:
     frame_id: str
     poses: tuple[PoseStamped, ...]
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         header = header_to_ros(self.stamp_ns, self.frame_id)
         return make("nav_msgs/Path", header=header, poses=[pose.to_ros() for pose in self.poses])
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         poses = tuple(PoseStamped.from_ros(pose) for pose in ros.poses)
         return cls(stamp_from_ros(ros.header.stamp), ros.header.frame_id, poses)
@@ -181,7 +182,7 @@ class Odometry:
         """Covariance (3, 3) of x, y, heading."""
         return self.pose_covariance[PLANAR]
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         twist = make(
             "geometry_msgs/Twist",
@@ -201,7 +202,7 @@ class Odometry:
         )
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         pose, twist = ros.pose.pose, ros.twist.twist
         return cls(

@@ -1,12 +1,13 @@
 """LaserScan."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.messages.parts import header_to_ros, make, stamp_from_ros
+from mcap_landmarks.messages.typestore import RosObject
 
 LONGEST_S = 2.0
 """Beams that are said to take longer than this for a turn have times that make no sense."""
@@ -39,7 +40,7 @@ class LaserScan:
         turn_s = self.time_increment_s * max(len(self.ranges_m) - 1, 0)
         return round(turn_s * 1e9) if 0 < turn_s <= LONGEST_S else 0
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         return make(
             "sensor_msgs/LaserScan",
@@ -56,7 +57,7 @@ class LaserScan:
         )
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         return cls(
             stamp_from_ros(ros.header.stamp),

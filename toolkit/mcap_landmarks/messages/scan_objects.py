@@ -1,7 +1,7 @@
 """What a LiDAR scan shows before anyone knows its class, carried as vision_msgs/Detection3DArray."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from mcap_landmarks.messages.hypotheses import (
     results_to_ros,
 )
 from mcap_landmarks.messages.parts import Array, header_to_ros, make, stamp_from_ros
+from mcap_landmarks.messages.typestore import RosObject
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +39,7 @@ class ScanObjects:
     def __len__(self) -> int:
         return len(self.ids)
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`; the box of an object spans its extent about the last hypothesis."""
         header = header_to_ros(self.stamp_ns, self.frame_id)
         return make(
@@ -47,14 +48,14 @@ class ScanObjects:
             detections=[self._object_to_ros(header, i) for i in range(len(self))],
         )
 
-    def _object_to_ros(self, header: Any, i: int) -> Any:
+    def _object_to_ros(self, header: RosObject, i: int) -> RosObject:
         places = [place_to_ros(*place) for place in zip(self.positions_xy[i], self.covariances[i], strict=True)]
         results = results_to_ros(self.hypotheses[i], places)
         middle = self.positions_xy[i][-1].tolist() if results else (0.0, 0.0)
         return object_to_ros(header, self.ids[i], results, middle, float(self.extents_m[i]))
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         hypotheses, positions, covariances = [], [], []
         for detection in ros.detections:

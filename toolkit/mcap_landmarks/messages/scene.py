@@ -1,7 +1,7 @@
 """SceneObjects: objects in the plane with classes and covariance, carried as vision_msgs/Detection3DArray."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from mcap_landmarks.messages.hypotheses import (
     results_to_ros,
 )
 from mcap_landmarks.messages.parts import Array, header_to_ros, make, stamp_from_ros
+from mcap_landmarks.messages.typestore import RosObject
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +43,7 @@ class SceneObjects:
         """The most probable class of each object, empty where it has none."""
         return tuple(options[0][0] if options else "" for options in self.hypotheses)
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         header = header_to_ros(self.stamp_ns, self.frame_id)
         return make(
@@ -51,13 +52,13 @@ class SceneObjects:
             detections=[self._object_to_ros(header, i) for i in range(len(self))],
         )
 
-    def _object_to_ros(self, header: Any, i: int) -> Any:
+    def _object_to_ros(self, header: RosObject, i: int) -> RosObject:
         place = place_to_ros(self.positions_xy[i], self.covariances[i])
         results = results_to_ros(self.hypotheses[i], [place] * len(self.hypotheses[i]))
         return object_to_ros(header, self.ids[i], results, self.positions_xy[i].tolist(), 2 * float(self.radii_m[i]))
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`; an object without any result keeps the centre of its box and an unknown covariance."""
         detections = ros.detections
         positions, covariances = np.zeros((len(detections), 2)), np.zeros((len(detections), 2, 2))

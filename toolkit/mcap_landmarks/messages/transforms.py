@@ -1,7 +1,7 @@
 """TFMessage: transforms between frames."""
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
 from numpy.typing import ArrayLike
 
@@ -16,6 +16,7 @@ from mcap_landmarks.messages.parts import (
     quaternion_to_ros,
     stamp_from_ros,
 )
+from mcap_landmarks.messages.typestore import RosObject
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,17 +43,17 @@ class TFMessage:
 
     transforms: tuple[Transform, ...]
 
-    def to_ros(self) -> Any:
+    def to_ros(self) -> RosObject:
         """See `Message`."""
         return make("tf2_msgs/TFMessage", transforms=[_to_ros(transform) for transform in self.transforms])
 
     @classmethod
-    def from_ros(cls, ros: Any) -> Self:
+    def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         return cls(tuple(_from_ros(transform) for transform in ros.transforms))
 
 
-def _to_ros(transform: Transform) -> Any:
+def _to_ros(transform: Transform) -> RosObject:
     return make(
         "geometry_msgs/TransformStamped",
         header=header_to_ros(transform.stamp_ns, transform.frame_id),
@@ -65,7 +66,7 @@ def _to_ros(transform: Transform) -> Any:
     )
 
 
-def _from_ros(ros: Any) -> Transform:
+def _from_ros(ros: RosObject) -> Transform:
     return Transform(
         stamp_from_ros(ros.header.stamp),
         ros.header.frame_id,

@@ -1,11 +1,15 @@
 """The message definitions we speak: humble's, and those in schemas/."""
 
 from functools import cache
+from typing import Any
 
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from mcap_landmarks.resources import resource
+
+RosObject = Any
+"""A message, or a part of one, of the typestore: its classes are made at run time, so that no checker knows them."""
 
 _OWN_PACKAGES = ("vision_msgs", "foxglove_msgs", "mcap_landmarks_msgs")
 

@@ -4,23 +4,23 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from struct import error as struct_error
-from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
+from rosbags.interfaces.typing import Constdefs
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.base import TypesysError
 from rosbags.typesys.store import Typestore
 
 from mcap_landmarks.errors import MessageError
+from mcap_landmarks.messages.layout import FieldType
 from mcap_landmarks.messages.typestore import definition, typestore
 from mcap_landmarks.sources._shape import Payload
 
 Convert = Callable[[Payload], Payload]
-Description = Any  # a field type of rosbags: (kind, content), nested
-Fields = list[tuple[str, Description]]
-Types = Mapping[str, tuple[Any, Fields]]
+Fields = list[tuple[str, FieldType]]
+Types = Mapping[str, tuple[Constdefs, Fields]]
 
 _RENAMED = {"tf/msg/tfMessage": "tf2_msgs/msg/TFMessage"}
 _HEADER = "std_msgs/msg/Header"
@@ -84,7 +84,7 @@ def _guarded(convert: Convert, ros_type: str) -> Convert:
 def _target(source: Types, source_name: str) -> tuple[str, Typestore]:
     """Name of the type in ROS 2, and a store with it and all that it needs."""
     humble = typestore().fielddefs
-    needed: dict[str, tuple[Any, Fields]] = {}
+    needed: dict[str, tuple[Constdefs, Fields]] = {}
 
     def take(name: str) -> str:
         new = _RENAMED.get(name, name)
@@ -103,7 +103,7 @@ def _target(source: Types, source_name: str) -> tuple[str, Typestore]:
     return target_name, target
 
 
-def _copy(types: Types, name: str, into: dict[str, tuple[Any, Fields]]) -> None:
+def _copy(types: Types, name: str, into: dict[str, tuple[Constdefs, Fields]]) -> None:
     if name not in into:
         into[name] = types[name]
         for _, kind in types[name][1]:
@@ -111,13 +111,13 @@ def _copy(types: Types, name: str, into: dict[str, tuple[Any, Fields]]) -> None:
                 _copy(types, nested, into)
 
 
-def _nested(kind: Description) -> str | None:
+def _nested(kind: FieldType) -> str | None:
     """Name of the message type in a field, None if it holds numbers or text."""
     inner = kind[1][0] if kind[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE} else kind
     return str(inner[1]) if inner[0] == Nodetype.NAME else None
 
 
-def _renamed(kind: Description, take: Callable[[str], str]) -> Description:
+def _renamed(kind: FieldType, take: Callable[[str], str]) -> FieldType:
     if kind[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE}:
         return kind[0], (_renamed(kind[1][0], take), kind[1][1])
     return (kind[0], take(kind[1])) if kind[0] == Nodetype.NAME else kind
@@ -133,7 +133,7 @@ def _fits(source: Types, source_name: str, target: Types, target_name: str) -> b
     )
 
 
-def _kind_fits(source: Types, kind: Description, target: Types, place: Description) -> bool:
+def _kind_fits(source: Types, kind: FieldType, target: Types, place: FieldType) -> bool:
     if kind[0] != place[0]:
         return False
     if kind[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE}:
@@ -168,7 +168,7 @@ def _migration(source: Types, source_name: str, target: Typestore, target_name: 
 
 
 def _field_migration(
-    source: Types, field: tuple[str, Description], target: Typestore, place: Description
+    source: Types, field: tuple[str, FieldType], target: Typestore, place: FieldType
 ) -> Callable[[object], object]:
     name, kind = field
     nested, wanted = _nested(kind), _nested(place)
@@ -180,7 +180,7 @@ def _field_migration(
     return lambda message: [migrate(item) for item in getattr(message, name)]
 
 
-def _default(target: Typestore, place: Description, _message: object = None) -> object:
+def _default(target: Typestore, place: FieldType, _message: object = None) -> object:
     kind, content = place
     if kind == Nodetype.BASE:
         return "" if content[0] == "string" else 0
