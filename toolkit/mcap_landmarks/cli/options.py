@@ -56,9 +56,7 @@ Extrinsics = Annotated[
 ]
 Use = Annotated[
     list[str] | None,
-    typer.Option(
-        "--use", metavar="STAGE", help="Stage to use where several can make what the log lacks; repeatable."
-    ),
+    typer.Option("--use", metavar="STAGE", help="Stage to use where several can make what the log lacks; repeatable."),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Run every stage anew, also where its results are there.")]
 ConfigFile = Annotated[Path | None, typer.Option("--config", help="TOML file with one table per stage.")]
