@@ -12,7 +12,7 @@ from mcap_landmarks.cli.stage_runs import Given, tell, told
 from mcap_landmarks.errors import UsageError
 
 if TYPE_CHECKING:
-    from mcap_landmarks.runs.build_map import MappedLog, MapRun
+    from mcap_landmarks.runs.map_results import MappedLog, MapRun
     from mcap_landmarks.runs.session import StageRun
 
 
@@ -50,7 +50,8 @@ def command(
 
 
 def _build(logs: list[Path], map_file: Path, prior: Path | None, output: Path | None, given: Given) -> "MapRun":
-    from mcap_landmarks.runs.build_map import MapTask, build_map
+    from mcap_landmarks.runs.build_map import build_map
+    from mcap_landmarks.runs.map_plan import MapTask
     from mcap_landmarks.runs.outputs import output_files
 
     targets = output_files(logs, output) if output else {}

@@ -1,0 +1,119 @@
+"""What became of a landmark map: found again where it was built before, and written to the logs that it is made of."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mcap_landmarks.channels import MAP_MARKERS, MAP_PATH, MAP_POSE
+from mcap_landmarks.manifest import RUN, Manifest, Outcome, stage_records
+from mcap_landmarks.mapping.observations import Trajectory
+from mcap_landmarks.maps.database import read_manifest, read_map
+from mcap_landmarks.maps.markers import markers_from_map
+from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.messages.poses import Path as PathMessage
+from mcap_landmarks.messages.poses import PoseStamped
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.runs.map_plan import LogPlan, MapPlan
+from mcap_landmarks.runs.output_writer import write_output
+from mcap_landmarks.runs.pipeline import told
+from mcap_landmarks.runs.session import StageRun, open_session, part_file
+from mcap_landmarks.stage import Stamped, Watch
+
+LOGS = "logs"
+"""The manifest's option with what came of each log: of the stages before, then of the map."""
+
+
+@dataclass(frozen=True, slots=True)
+class MappedLog:
+    """What became of one log on its way into a map; `outcome` counts its bundles and all that was lost."""
+
+    recording: Path
+    fingerprint: str
+    stages: tuple[StageRun, ...]
+    outcome: Outcome
+
+
+@dataclass(frozen=True, slots=True)
+class MapRun:
+    """The map, what became of it, and what became of each log."""
+
+    landmark_map: LandmarkMap
+    build: StageRun
+    logs: tuple[MappedLog, ...]
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """What the map says of the logs, in their order."""
+        return self.landmark_map.sources[len(self.landmark_map.sources) - len(self.logs) :]
+
+
+def earlier_run(plan: MapPlan, parts: Path) -> MapRun | None:
+    """The run that made the database, if it is the one that is planned and left its results in all outputs."""
+    entries = read_manifest(plan.task.database)
+    if _difference(entries, plan):
+        return None
+    for log in plan.logs:
+        output = plan.task.outputs.get(log.request.recording)
+        if output is not None:
+            with open_session(log.request, parts, output) as session:
+                if session.find(plan.share(log)) is None:
+                    return None
+    reason = "the map was made from the same logs, files and settings"
+    logs = []
+    for log, (*before, own) in zip(plan.logs, json.loads(entries["options"])[LOGS], strict=True):
+        outcomes = zip(log.steps, before, strict=True)
+        stages = tuple(StageRun(step.stage.name, "reused", reason, Outcome.of(outcome)) for step, outcome in outcomes)
+        logs.append(MappedLog(log.request.recording, log.fingerprint, stages, Outcome.of(own)))
+    build = StageRun(plan.record.stage, "reused", reason, Outcome())
+    return MapRun(read_map(plan.task.database), build, tuple(logs))
+
+
+def why_anew(plan: MapPlan) -> str:
+    """Why the map has to be built, in words, where `earlier_run` found none."""
+    if plan.task.requests[0].force:
+        return "--force"
+    return _difference(read_manifest(plan.task.database), plan) or "an output has no results of it"
+
+
+def _difference(entries: Mapping[str, str], plan: MapPlan) -> str:
+    """What a map that is there, with this manifest, was made from other than is planned; empty if nothing."""
+    earlier = stage_records({RUN: entries}).get(plan.record.stage)
+    return "there was no such map" if earlier is None else plan.record.difference(earlier)
+
+
+def write_part(plan: MapPlan, log: LogPlan, landmark_map: LandmarkMap, trajectory: Trajectory, parts: Path) -> None:
+    """One log's results of the map as a recording of their own."""
+    record = plan.share(log)
+    with create_recording(part_file(parts, record)) as writer:
+        for stamped in _results(landmark_map, trajectory):
+            writer.add(stamped, record.stage)
+        writer.metadata[RUN] = Manifest("part", fingerprint=record.key, stages=(record,)).entries()
+
+
+def _results(landmark_map: LandmarkMap, trajectory: Trajectory) -> Iterator[Stamped]:
+    frame = landmark_map.frame
+    poses = [
+        PoseStamped.planar(int(stamp), frame, pose)
+        for stamp, pose in zip(trajectory.stamps_ns, trajectory.map_from_base, strict=True)
+    ]
+    first, first_stamp = int(trajectory.log_times_ns[0]), int(trajectory.stamps_ns[0])
+    yield Stamped(MAP_MARKERS, first, markers_from_map(landmark_map, first_stamp))
+    yield Stamped(MAP_PATH, first, PathMessage(first_stamp, frame, tuple(poses)))
+    for log_time_ns, pose in zip(trajectory.log_times_ns, poses, strict=True):
+        yield Stamped(MAP_POSE, int(log_time_ns), pose)
+
+
+def write_log(plan: MapPlan, log: LogPlan, mapped: MappedLog, parts: Path, watch: Watch) -> MappedLog:
+    """Write one log with all its results where it has an output; what became of it, with what showed on the way."""
+    output, outcome = plan.task.outputs.get(mapped.recording), mapped.outcome
+    if output is None:
+        return mapped
+    with open_session(log.request, parts, output) as session:
+        for step in log.steps:
+            if session.find(step.record) is None:
+                session.work(step, watch)
+        session.find(plan.share(log))
+        notes, losses = write_output(session, output, "map", [other.fingerprint for other in plan.logs], watch)
+    all_notes, all_losses = told([StageRun(plan.record.stage, "", "", outcome)], notes, losses)
+    return replace(mapped, outcome=replace(outcome, notes=all_notes, losses=all_losses))
