@@ -7,7 +7,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap_landmarks.errors import RecordingError
-from mcap_landmarks.runs.convert import Selection, convert
+from mcap_landmarks.runs.conversion import Selection
+from mcap_landmarks.runs.convert import convert
 from mcap_landmarks.stage import unwatched
 
 from tests.sources.bags import write_plain_db3, write_ros1

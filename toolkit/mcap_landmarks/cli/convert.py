@@ -9,7 +9,8 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, warn
 
 if TYPE_CHECKING:
-    from mcap_landmarks.runs.convert import Conversion, Converted
+    from mcap_landmarks.runs.conversion import Converted
+    from mcap_landmarks.runs.convert import Conversion
 
 
 def command(
@@ -36,7 +37,8 @@ def command(
     robots gives one file per robot, in a folder.
     """
     from mcap_landmarks.config import gather
-    from mcap_landmarks.runs.convert import Selection, convert
+    from mcap_landmarks.runs.conversion import Selection
+    from mcap_landmarks.runs.convert import convert
 
     chosen = gather(config_file, settings or [], None)
     if distro:

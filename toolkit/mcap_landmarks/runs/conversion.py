@@ -1,0 +1,187 @@
+"""One output of a conversion: the logs that are merged into it, and the account of all their messages."""
+
+import re
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain
+from pathlib import Path
+
+from mcap_landmarks.config import effective
+from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.inspection.open_logs import McapLog, OpenLog
+from mcap_landmarks.manifest import CARRIED, RUN, Manifest, entry_text
+from mcap_landmarks.messages.qos import KEY
+from mcap_landmarks.recording.latched import carried_note, latched, latest
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.sources import Piece, merge
+from mcap_landmarks.stage import Connection, Progress, RawMessage
+
+_LOST_WITH = frozenset({RUN, "rosbag2"})  # metadata records that would no longer be true
+_COMMENT = re.compile(rb"#[^\n]*")
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """What of the logs is wanted: topics (full-match regular expressions, none for all) and log times."""
+
+    topics: tuple[str, ...] = ()
+    start_ns: int | None = None
+    end_ns: int | None = None
+
+    def options(self) -> dict[str, object]:
+        """For the manifest: what was asked for."""
+        given = {"topics": list(self.topics), "start_ns": self.start_ns, "end_ns": self.end_ns}
+        return {key: value for key, value in given.items() if value not in (None, [])}
+
+
+@dataclass(slots=True)
+class Converted:
+    """One output: messages by topic, how many the storage declared and how many of these could not be read."""
+
+    path: Path
+    topics: Counter[str] = field(default_factory=Counter)
+    declared: int = 0
+    lost: int = 0
+    dropped: Counter[str] = field(default_factory=Counter)
+    losses: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+class Job:
+    """One output on its way: the logs that are merged into it."""
+
+    def __init__(
+        self, target: Path, logs: Sequence[OpenLog], selection: Selection, patterns: Sequence[re.Pattern[str]]
+    ) -> None:
+        self._target, self._logs, self._selection = target, logs, selection
+        self._parts = [part for log in logs for part in log.parts]
+        self._declared: Counter[Connection] = Counter()
+        self._unified = self._unify(patterns)
+
+    def _unify(self, patterns: Sequence[re.Pattern[str]]) -> dict[Connection, Connection]:
+        """The connection that stands in the output for each wanted one: equal ones share theirs."""
+        unified: dict[Connection, Connection] = {}
+        known: dict[tuple[object, ...], Connection] = {}
+        topics = set()
+        for entry in (entry for part in self._parts for entry in part.channels):
+            connection = entry.connection
+            topics.add(connection.topic)
+            if not patterns or any(pattern.fullmatch(connection.topic) for pattern in patterns):
+                unified[connection] = known.setdefault(_identity(connection), connection)
+                self._declared[unified[connection]] += entry.count
+        if topics and not unified:
+            raise UsageError(f"{self._logs[0].path}: --topics matches none of {', '.join(sorted(topics))}")
+        return unified
+
+    def run(self, hashes: Mapping[Path, str], advance: Progress) -> Converted:
+        """Write the output.
+
+        Raises:
+            RecordingError: no message can be read, or the output cannot be written.
+        """
+        done = Converted(self._target)
+        for log in self._logs:
+            done.dropped.update(log.dropped)
+            done.notes.extend(log.notes)
+        counts: Counter[Connection] = Counter()
+        carried = self._before_start()
+        with create_recording(self._target, self._metadata(hashes)) as writer:
+            for connection in self._unified.values():
+                writer.declare(connection)
+                done.topics[connection.topic] += 0
+            within = self._messages(self._unified, self._selection.start_ns, self._selection.end_ns, advance)
+            for raw in chain(carried, within):
+                writer.write(raw)
+                counts[raw.connection] += 1
+            for part in self._parts:
+                if isinstance(part, McapLog):
+                    part.copy_attachments(writer)
+            for connection, count in counts.items():
+                done.topics[connection.topic] += count
+            if carried:
+                on_topics = Counter(raw.connection.topic for raw in carried)
+                done.notes.append(carried_note(on_topics))
+                writer.metadata[RUN][CARRIED] = entry_text(on_topics)
+            self._account(done, counts, len(carried))
+        return done
+
+    def _messages(
+        self,
+        connections: Collection[Connection],
+        start_ns: int | None,
+        end_ns: int | None,
+        advance: Progress | None = None,
+    ) -> Iterator[RawMessage]:
+        """The messages of some connections, of all parts by time, on the connections of the output."""
+        unified = self._unified
+        pieces: list[Piece] = [
+            (part.start_ns, partial(part.messages, set(connections), start_ns, end_ns, advance))
+            for part in self._parts
+            if part.start_ns is not None
+        ]
+        if all(connection is own for connection, own in unified.items()):
+            yield from merge(pieces)
+            return
+        for connection, log_time_ns, publish_time_ns, sequence, data in merge(pieces):
+            yield RawMessage(unified[connection], log_time_ns, publish_time_ns, sequence, data)
+
+    def _before_start(self) -> list[RawMessage]:
+        """What holds at the start that was chosen because of messages before it."""
+        start_ns = self._selection.start_ns
+        return [] if start_ns is None else latest(self._messages(latched(self._unified), None, start_ns), start_ns)
+
+    def _account(self, done: Converted, counts: Counter[Connection], carried: int) -> None:
+        """Compare what was read with what the storage declares; with no message but carried ones there is no output."""
+        declared = sum(self._declared.values())
+        missing = sum(max(count - counts[connection], 0) for connection, count in self._declared.items())
+        read = counts.total()
+        done.losses = [loss for log in self._logs for loss in log.losses]
+        done.losses += [loss for part in self._parts for loss in part.losses]
+        if self._selection.start_ns is not None or self._selection.end_ns is not None:
+            if missing:
+                done.dropped["messages outside the time range"] += missing
+        else:
+            done.lost = missing
+        done.declared = read + done.lost
+        if read == carried:
+            raise RecordingError(f"{self._where()}: {self._why_nothing(declared, done)}")
+
+    def _where(self) -> str:
+        return ", ".join(dict.fromkeys(str(log.path) for log in self._logs))
+
+    def _why_nothing(self, declared: int, done: Converted) -> str:
+        if done.losses:
+            return f"no message can be read: {done.losses[0]}"
+        if done.lost:
+            return f"none of {done.lost} declared messages can be read; copy it again"
+        if declared:
+            start = min((log.start_ns for log in self._logs if log.start_ns is not None), default=None)
+            end = max((log.end_ns for log in self._logs if log.end_ns is not None), default=None)
+            return f"no message lies in the time range; the log goes from {start} to {end}"
+        if done.dropped:
+            return "; ".join(f"{reason} ({count})" for reason, count in done.dropped.items())
+        return "there are no messages in it; choose another log, or other --topics"
+
+    def _metadata(self, hashes: Mapping[Path, str]) -> Mapping[str, Mapping[str, str]]:
+        """The inputs' metadata records, where these stay true, and the manifest."""
+        carried: dict[str, Mapping[str, str]] = {}
+        for part in self._parts:
+            if isinstance(part, McapLog):
+                carried.update({name: entries for name, entries in part.metadata.items() if name not in _LOST_WITH})
+        manifest = Manifest(
+            verb="convert",
+            config={log.source: effective(log.config) for log in self._logs},
+            inputs=tuple(hashes[log.path] for log in self._logs),
+            options=self._selection.options(),
+        )
+        return {**carried, RUN: manifest.entries()}
+
+
+def _identity(connection: Connection) -> tuple[object, ...]:
+    """What makes connections one channel: topic, type and quality of service, where the definitions agree."""
+    definition = tuple(_COMMENT.sub(b"", connection.schema).split())
+    quality = connection.metadata.get(KEY)
+    encodings = connection.message_encoding, connection.schema_encoding
+    return connection.topic, connection.message_type, encodings, definition, quality
