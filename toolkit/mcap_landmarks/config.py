@@ -17,7 +17,7 @@ from mcap_landmarks.sources import find_source, source_names
 from mcap_landmarks.stage import Config, Stage
 from mcap_landmarks.stages import find_stage, stage_names
 
-C = TypeVar("C", bound=Config)
+_C = TypeVar("_C", bound=Config)
 Settings = dict[str, dict[str, object]]
 """What the user set: value by key, by stage or source. What is not set has the default of the dataclass."""
 
@@ -101,7 +101,7 @@ def _merged(one: Mapping[str, object], other: Mapping[str, object]) -> dict[str,
     return merged
 
 
-def stage_config(config: type[C], stage: str, settings: Mapping[str, object]) -> C:
+def stage_config(config: type[_C], stage: str, settings: Mapping[str, object]) -> _C:
     """The configuration of one stage: its defaults with the settings over them.
 
     Raises:

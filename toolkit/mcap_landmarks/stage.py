@@ -116,7 +116,7 @@ class Stamped:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Steps:
+class OdometrySamples:
     """Odometry messages around a moment: stamps_ns (K,), rising, and odom_from_base (K, 3)."""
 
     stamps_ns: NDArray[np.int64]
@@ -130,7 +130,7 @@ class OdometryAt:
     The covariance is that of the message before; all zero where the log leaves it unknown. `way_m` and `turned_rad` are
     the length of the path and the sum of all turning since the log began, so that a loop back to the start counts.
     `velocity` (3,) is the base's own: forward and left in m/s and turning in rad/s, over the two messages around.
-    `steps` are there where the bundle's message took a while to measure, and span that while if the log does.
+    `samples` are there where the bundle's message took a while to measure, and span that while if the log does.
     """
 
     frame_id: str
@@ -139,19 +139,19 @@ class OdometryAt:
     way_m: float
     turned_rad: float
     velocity: Array = field(default_factory=lambda: np.zeros(3))
-    steps: Steps | None = None
+    samples: OdometrySamples | None = None
 
     def base_from_then(self, stamp_ns: int, times_ns: NDArray[np.int64]) -> Array:
         """Where the base was at some times (N,), as poses (N, 3) in the base frame at `stamp_ns`.
 
         Beyond what the log tells the base keeps its velocity, or stays where it was last.
         """
-        steps = self.steps
-        if steps is None or not (len(steps.stamps_ns) > 1 and steps.stamps_ns[0] <= times_ns.min()):
+        samples = self.samples
+        if samples is None or not (len(samples.stamps_ns) > 1 and samples.stamps_ns[0] <= times_ns.min()):
             return exp((times_ns - stamp_ns)[:, None] / 1e9 * self.velocity)
         # What the log does not tell any more is little: a bundle waits until odometry has passed its last beam.
-        known = np.minimum(times_ns, steps.stamps_ns[-1])
-        return between(self.odom_from_base, interpolate(steps.stamps_ns, steps.odom_from_base, known))
+        known = np.minimum(times_ns, samples.stamps_ns[-1])
+        return between(self.odom_from_base, interpolate(samples.stamps_ns, samples.odom_from_base, known))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

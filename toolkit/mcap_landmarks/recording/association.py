@@ -122,7 +122,7 @@ class _Table:
             counts.without_odometry += odometry is None
             duration_ns = self._duration_ns(bundle)
             if odometry is not None and duration_ns:
-                odometry = replace(odometry, steps=self._odometry.around(bundle.stamp_ns, duration_ns))
+                odometry = replace(odometry, samples=self._odometry.around(bundle.stamp_ns, duration_ns))
         found.update({channel: held.latest for channel, held in self._held.items() if held.latest is not None})
         for channel, partners in self._beside.items():
             partner = partners.pick(bundle.stamp_ns, self._stamps)

@@ -11,14 +11,14 @@ from mcap_landmarks.geometry.se2 import between, interpolate, log
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.poses import Odometry, PoseStamped
 from mcap_landmarks.messages.transforms import TFMessage
-from mcap_landmarks.stage import OdometryAt, Steps
+from mcap_landmarks.stage import OdometryAt, OdometrySamples
 
 WIDEST_GAP_NS = 2 * 10**9
 """The widest gap that odometry is interpolated over."""
 
 _KEPT_NS = 3 * WIDEST_GAP_NS
 _AROUND_NS = 300_000_000
-"""Steps span so much more than the sweep, for a scan of a second LiDAR beside it or a cloud stamped at its end."""
+"""Samples span so much more than the sweep, for a scan of a second LiDAR beside it or a cloud stamped at its end."""
 _BASES = ("base_footprint", "base_link")
 
 
@@ -76,13 +76,13 @@ class OdometryBuffer:
             self._stamps.popleft()
             self._steps.popleft()
 
-    def around(self, stamp_ns: int, duration_ns: int) -> Steps:
+    def around(self, stamp_ns: int, duration_ns: int) -> OdometrySamples:
         """The messages from a little before a time to a little after a while later."""
         left = max(bisect_left(self._stamps, stamp_ns - _AROUND_NS) - 1, 0)
         right = bisect_left(self._stamps, stamp_ns + duration_ns + _AROUND_NS) + 1
         steps = list(islice(self._steps, left, right))
         stamps = np.array(list(islice(self._stamps, left, right)), dtype=np.int64)
-        return Steps(stamps, np.array([step.odom_from_base for step in steps]).reshape(-1, 3))
+        return OdometrySamples(stamps, np.array([step.odom_from_base for step in steps]).reshape(-1, 3))
 
     def at(self, stamp_ns: int) -> OdometryAt | None:
         """Odometry at a time between two stamps that are close enough together, else None."""
