@@ -9,7 +9,7 @@ from mcap_landmarks.messages.parts import Array, make, stamp_from_ros, stamp_to_
 from mcap_landmarks.messages.typestore import RosObject
 
 Color = tuple[float, float, float, float]
-_LINE_LOOP = 2
+_LINE_LOOP = 2  # of foxglove_msgs/PointsAnnotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)

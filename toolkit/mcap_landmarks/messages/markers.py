@@ -70,7 +70,7 @@ class MarkerArray:
         return cls(stamp_from_ros(header.stamp), header.frame_id, shown, replaces)
 
 
-_ADD, _DELETE_ALL = 0, 3
+_ADD, _DELETE_ALL = 0, 3  # of visualization_msgs/Marker
 _ALL = Marker("", 0, Shape.CYLINDER, np.zeros(3), np.zeros(3), (0.0, 0.0, 0.0, 0.0))
 
 

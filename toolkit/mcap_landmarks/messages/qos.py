@@ -2,6 +2,7 @@
 
 KEY = "offered_qos_profiles"
 _FOREVER = "sec: 9223372036\n    nsec: 854775807"
+# The numbers of humble's rmw/types.h; deadlines that never come are its largest duration.
 _KEEP_LAST, _RELIABLE, _TRANSIENT_LOCAL, _VOLATILE, _AUTOMATIC = 1, 1, 1, 2, 1
 
 

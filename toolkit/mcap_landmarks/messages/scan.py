@@ -10,7 +10,7 @@ from mcap_landmarks.messages.parts import header_to_ros, make, stamp_from_ros
 from mcap_landmarks.messages.typestore import RosObject
 
 LONGEST_S = 2.0
-"""Beams that are said to take longer than this for a turn have times that make no sense."""
+"""Beams that are said to take longer for a turn have wrong times; no bundle waits for them longer either."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,8 @@ WINDOW_NS = WIDEST_GAP_NS
 """How long a bundle waits for its partners."""
 
 BESIDE_NS = 250_000_000
-"""How far from a bundle's stamp a message may be that belongs beside it."""
+"""How far from a bundle's stamp a message may be that belongs beside it: half a period at 2 Hz, and who records
+fewer images has most bundles without one anyway."""
 
 
 @dataclass(slots=True)

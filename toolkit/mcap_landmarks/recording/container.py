@@ -15,7 +15,7 @@ MESSAGE_FIXED = MESSAGE.size - RECORD.size
 CHUNK = Struct("<QQQI")  # first and last log time, uncompressed size, uncompressed crc
 FOOTER_SIZE = RECORD.size + 20
 LARGEST_CHUNK = 1 << 30
-"""A chunk that claims to be larger than this is taken for damage, and not allocated."""
+"""A chunk that claims to be larger is taken for damage, and not allocated: recorders write chunks of a few MB."""
 
 R = TypeVar("R", bound=McapRecord)
 

@@ -11,7 +11,7 @@ from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FI
 from mcap_landmarks.recording.index import Block, Index
 
 RUN_BYTES = 1 << 20
-"""A run of messages outside chunks ends here: each becomes one block, and blocks are read whole."""
+"""A run of messages outside chunks ends here, as our chunks do: each becomes one block, which is read whole."""
 
 
 class _Run:

@@ -25,7 +25,7 @@ from mcap_landmarks.stage import Channel, Connection, RawMessage, Stamped
 
 CHUNK_BYTES = 1 << 20
 CHUNK_NS = 5 * 10**9
-"""Where a chunk ends: chunks that overlap in time over longer cost readers memory."""
+"""Where a chunk ends: between 256 KiB and 4 MiB size hardly matters, and those that overlap for longer cost memory."""
 _IMAGE_TYPES = frozenset({"sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"})
 _LATCHED = frozenset(channel.topic for channel in (TF_STATIC, MAP, MAP_MARKERS, MAP_PATH, TRUTH_OBJECTS))
 

@@ -19,6 +19,7 @@ _ONE_THREAD = dict.fromkeys(
     "1",
 )
 _LAST_WORDS_S = 10.0
+"""How long an interrupted process may clean up, as long as `docker stop` waits."""
 
 
 @dataclass(frozen=True, slots=True)
