@@ -12,8 +12,9 @@ from mcap_landmarks.lidar.beams import sweep
 from mcap_landmarks.lidar.clustering import cluster, shapes_of
 from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.objects import Hypotheses
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.index import MapIndex
-from mcap_landmarks.localization.matching import MatchConfig, Matcher
+from mcap_landmarks.localization.matching import Matcher
 from mcap_landmarks.maps.exchange_thesis import parse_map, parse_results
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.messages.scene import SceneObjects
@@ -81,7 +82,7 @@ class _World:
     def __init__(self, landmark_map: LandmarkMap, seed: int) -> None:
         self._map = landmark_map
         self._rng = np.random.default_rng(seed)
-        self._matcher = Matcher(MapIndex.build(landmark_map), MatchConfig(map_sigma_m=0.001))
+        self._matcher = Matcher(MapIndex.build(landmark_map), LocalizeConfig(map_sigma_m=0.001))
         self._turn = self._rng.uniform(-np.pi, np.pi, len(landmark_map))
         self._config = ClusterConfig()
         self._shapes = shapes_of(self._config)

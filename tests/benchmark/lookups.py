@@ -11,8 +11,9 @@ from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.index import MapIndex
-from mcap_landmarks.localization.matching import MatchConfig, Matcher, block_diagonal
+from mcap_landmarks.localization.matching import Matcher, block_diagonal
 from mcap_landmarks.maps.database import read_map, read_neighbours, write_map
 
 from tests.benchmark.rows import Row
@@ -83,7 +84,7 @@ def _grow(groups: int, classes: int, seed: int) -> _Growth:
 def _look_up(world: World, index: MapIndex, seed: int) -> tuple[float, float, float]:
     """Median seconds per bundle over several rounds, candidates per bundle, share with the true pose among them."""
     rng = np.random.default_rng((seed, 1))
-    matcher = Matcher(index, MatchConfig())
+    matcher = Matcher(index, LocalizeConfig())
     points, spread, options, poses = [], [], [], []
     for _ in range(_BATCH):
         members = np.arange(3) + 3 * rng.integers(0, world.group_of.max() + 1)

@@ -4,8 +4,9 @@ import sys
 from collections.abc import Iterator
 
 import numpy as np
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.index import MapIndex
-from mcap_landmarks.localization.matching import MatchConfig, Matcher
+from mcap_landmarks.localization.matching import Matcher
 
 from tests.benchmark.lookups import lookup_rows
 from tests.benchmark.modulo import modulo_rows
@@ -21,7 +22,7 @@ _STRETCHES, _FEW_STRETCHES = 480, 25  # of 21 bundles each
 
 
 def _matcher(world: World) -> Matcher:
-    return Matcher(MapIndex.build(world.landmark_map), MatchConfig())
+    return Matcher(MapIndex.build(world.landmark_map), LocalizeConfig())
 
 
 def _views(count: int) -> tuple[float, float]:

@@ -3,8 +3,9 @@
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.index import MapIndex
-from mcap_landmarks.localization.matching import MatchConfig, Matcher
+from mcap_landmarks.localization.matching import Matcher
 
 from tests.benchmark.rows import Row
 from tests.benchmark.stretches import CAMERA, Conditions, in_parallel, judged, stretch
@@ -36,7 +37,7 @@ def outlier_rows(seed: int, quick: bool) -> Iterator[Row]:
 
 
 def _until_localized(world: World, conditions: Conditions, seed: tuple[int, int], count: int) -> tuple[float, float]:
-    matcher = Matcher(MapIndex.build(world.landmark_map), MatchConfig())
+    matcher = Matcher(MapIndex.build(world.landmark_map), LocalizeConfig())
     shares = np.mean(in_parallel(_first_answer(matcher, world, conditions, seed), count), axis=0)
     return float(shares[0]), float(shares[1])
 
@@ -61,6 +62,6 @@ def _single(world: World, seed: int, count: int) -> tuple[float, float]:
         middle = world.positions_xy[rng.integers(0, len(world.positions_xy))]
         poses.append(pose_looking_at(rng, middle, 6.0, 10.0))
         scenes.append(scene(rng, world, poses[-1], Sensor(), None, _MISCLASSIFIED, _SPURIOUS)[0])
-    matches = Matcher(MapIndex.build(world.landmark_map), MatchConfig()).match(scenes)
+    matches = Matcher(MapIndex.build(world.landmark_map), LocalizeConfig()).match(scenes)
     shares = np.mean([judged(match, pose) for match, pose in zip(matches, poses, strict=True)], axis=0)
     return float(shares[0]), float(shares[1])

@@ -5,8 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from mcap_landmarks.geometry.se2 import transform_points
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.index import MapIndex
-from mcap_landmarks.localization.matching import MatchConfig, Matcher, block_diagonal
+from mcap_landmarks.localization.matching import Matcher, block_diagonal
 from mcap_landmarks.localization.verification import UNMATCHED
 from mcap_landmarks.messages.scene import SceneObjects
 from numpy.typing import NDArray
@@ -122,7 +123,7 @@ def test_as_many_inliers_as_the_maximum_clique(count: int) -> None:
     rng = np.random.default_rng(count)
     for _ in range(4):
         world = random_world(rng, 15)
-        matcher = Matcher(MapIndex.build(world.landmark_map), MatchConfig())
+        matcher = Matcher(MapIndex.build(world.landmark_map), LocalizeConfig())
         for _ in range(8):
             seen = bundle(rng, world, count, rng.uniform(0.2, 0.6))
             clique, matched = largest(world, seen), best_place(matcher, seen)
@@ -135,6 +136,6 @@ def test_cliques_without_near_objects_are_found() -> None:
     rng = np.random.default_rng(3)
     for _ in range(12):
         world = random_world(rng, 15)
-        matcher = Matcher(MapIndex.build(world.landmark_map), MatchConfig())
+        matcher = Matcher(MapIndex.build(world.landmark_map), LocalizeConfig())
         seen = among_decoys(rng, world, 8)
         assert len(best_place(matcher, seen)) >= len(largest(world, seen)) >= 7

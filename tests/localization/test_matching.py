@@ -7,9 +7,10 @@ import pytest
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.estimation.odometry import OdometryNoise
 from mcap_landmarks.geometry.se2 import between
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.decision import Match
 from mcap_landmarks.localization.index import MapIndex
-from mcap_landmarks.localization.matching import MatchConfig, Matcher
+from mcap_landmarks.localization.matching import Matcher
 from mcap_landmarks.localization.sequence import Joiner
 from mcap_landmarks.maps.model import LandmarkMap, Source
 from mcap_landmarks.messages.match import Status
@@ -21,7 +22,7 @@ from tests.maps.examples import small_map
 
 
 def matcher_of(world: World) -> Matcher:
-    return Matcher(MapIndex.build(world.landmark_map), MatchConfig())
+    return Matcher(MapIndex.build(world.landmark_map), LocalizeConfig())
 
 
 def views(world: World, count: int, seed: int) -> list[tuple[SceneObjects, np.ndarray]]:
@@ -56,7 +57,7 @@ def test_unknown_places_are_refused() -> None:
     assert sum(match.message.status == Status.LOCALIZED for match in found) <= 1
     refused = [match.message for match in found if match.pose is None]
     assert {message.status for message in refused} <= {Status.AMBIGUOUS, Status.NO_MATCH}
-    assert all(message.expected_accidental > MatchConfig().accidental for message in refused)
+    assert all(message.expected_accidental > LocalizeConfig().accidental for message in refused)
 
 
 def stretch(world: World, seed: int, scale: float = 1.0) -> tuple[list[Match], list[np.ndarray]]:

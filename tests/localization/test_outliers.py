@@ -2,14 +2,15 @@
 
 import numpy as np
 from mcap_landmarks.localization.acceptance import PairDensity
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.index import MapIndex
 from mcap_landmarks.localization.local_map import Surroundings
-from mcap_landmarks.localization.matching import MatchConfig, Matcher
+from mcap_landmarks.localization.matching import Matcher
 
 from tests.benchmark.stretches import CAMERA, Conditions, judged, stretch
 from tests.benchmark.worlds import Sensor, World, appendix_c, random_world
 
-CONFIG = MatchConfig()
+CONFIG = LocalizeConfig()
 SURE, LIKELY = np.array([0.98, 0.01, 0.01]), np.array([0.01, 0.98, 0.01])
 
 

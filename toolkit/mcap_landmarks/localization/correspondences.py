@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.estimation.polar import polar_from_points
 from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.maps.scene_objects import known_covariances
 from mcap_landmarks.messages.scene import SceneObjects
@@ -18,15 +19,6 @@ Bools = NDArray[np.bool_]
 
 # Larger than this, and the sigma of a bearing leaves the whole circle open.
 _NO_BEARING_RAD = 1.0
-
-
-class Sigmas(Protocol):
-    """Sigmas that stand in for unknown covariances."""
-
-    @property
-    def range_sigma_m(self) -> float: ...
-    @property
-    def bearing_sigma_rad(self) -> float: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,7 +42,7 @@ class Given:
     mask: Bools
 
     @classmethod
-    def of(cls, problems: Sequence[Problem], landmark_map: LandmarkMap, sigmas: Sigmas) -> Self:
+    def of(cls, problems: Sequence[Problem], landmark_map: LandmarkMap, config: LocalizeConfig) -> Self:
         """Arrays of B problems."""
         count, width = len(problems), max(len(problem.objects) for problem in problems)
         points, covariances = np.ones((count, width, 2)), np.tile(np.eye(2), (count, width, 1, 1))
@@ -60,7 +52,7 @@ class Given:
             k = len(problem.objects)
             mask[i, :k] = True
             points[i, :k] = problem.scene.positions_xy[problem.objects]
-            known = known_covariances(problem.scene, sigmas.range_sigma_m, sigmas.bearing_sigma_rad)
+            known = known_covariances(problem.scene, config.range_sigma_m, config.bearing_sigma_rad)
             covariances[i, :k] = known[problem.objects]
             landmarks[i, :k] = landmark_map.positions_xy[problem.landmarks]
             spread[i, :k] = landmark_map.covariances[problem.landmarks]

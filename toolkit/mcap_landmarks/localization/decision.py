@@ -1,7 +1,6 @@
 """What is said of one bundle after matching: accepted with a pose, or refused with the candidates."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +8,7 @@ from scipy.special import logsumexp
 
 from mcap_landmarks.estimation.pose import position_sigma
 from mcap_landmarks.geometry import se2
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.index import MapIndex
 from mcap_landmarks.localization.verification import UNMATCHED, Fits
 from mcap_landmarks.messages.match import LandmarkMatch, Status
@@ -18,20 +18,6 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _LISTED = 5
-
-
-class Limits(Protocol):
-    """What is accepted: so many accidental matches to expect, so large a standard deviation of the position."""
-
-    @property
-    def accidental(self) -> float:
-        """The most accidental matches to expect of a match that is accepted."""
-        ...
-
-    @property
-    def max_sigma_m(self) -> float:
-        """The largest standard deviation of a position that is accepted."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,9 +79,15 @@ def refused(scene: SceneObjects, index: MapIndex, places: Places | None, joined:
 
 
 def accepted(
-    scene: SceneObjects, rows: Ints, points_xy: Array, index: MapIndex, fix: Fix, limits: Limits, joined: int = 1
+    scene: SceneObjects,
+    rows: Ints,
+    points_xy: Array,
+    index: MapIndex,
+    fix: Fix,
+    config: LocalizeConfig,
+    joined: int = 1,
 ) -> Match:
-    """A bundle that was seen from a known pose, unless the limits say no; `rows` (K,) are its objects in the scene."""
+    """A bundle that was seen from a known pose, unless a limit says no; `rows` (K,) are its objects in the scene."""
     turn = np.eye(3)
     turn[:2, :2] = se2.rotation(fix.pose[2])
     covariance = turn @ fix.covariance @ turn.T
@@ -104,13 +96,13 @@ def accepted(
     status = Status.LOCALIZED
     if len(scene) < 2:
         status = Status.TOO_FEW_OBJECTS
-    elif fix.expected_accidental > limits.accidental:
+    elif fix.expected_accidental > config.accidental:
         status = Status.AMBIGUOUS
     elif not len(matched):
         status = Status.NO_MATCH
     elif 2 * len(matched) < len(rows):
         status = Status.INCONSISTENT
-    elif position_sigma(covariance) > limits.max_sigma_m:
+    elif position_sigma(covariance) > config.max_sigma_m:
         status = Status.WEAK_GEOMETRY
     miss = se2.transform_points(fix.pose, points_xy[matched]) - index.positions_xy[landmarks]
     message = LandmarkMatch(

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.localization.acceptance import PairDensity
-from mcap_landmarks.localization.matching import MatchConfig
+from mcap_landmarks.localization.config import LocalizeConfig
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -30,7 +30,7 @@ class Surroundings:
     sighting, since shapes and sensors err alike from similar views, so looking longer helps only so far.
     """
 
-    def __init__(self, density: PairDensity, frequency: Array, length_m: float, config: MatchConfig) -> None:
+    def __init__(self, density: PairDensity, frequency: Array, length_m: float, config: LocalizeConfig) -> None:
         self._density, self._frequency, self._length_m, self._config = density, frequency, length_m, config
         self._way_m = 0.0
         self._strays = 0

@@ -11,6 +11,7 @@ from scipy.special import chdtri, logsumexp
 
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.localization.acceptance import ClassEvidence, PairDensity
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.decision import Fix, Match, Places, accepted, refused
 from mcap_landmarks.localization.index import MapIndex
 from mcap_landmarks.localization.pose_candidates import Finder
@@ -34,25 +35,6 @@ _SAME_M, _SAME_RAD = 0.5, 0.17
 _PLACES = 32
 
 
-@dataclass(frozen=True, slots=True)
-class MatchConfig:
-    """When a bundle counts as matched.
-
-    `accidental`: the most accidental matches to expect for a match to be accepted. `max_sigma_m`: a position with a
-    larger standard deviation in any direction is refused. Sigmas of range, bearing and map stand in where covariances
-    are unknown. `misread`: probability that an object's classes are wrong. `spurious`: that an object is not in the
-    map.
-    """
-
-    accidental: float = 2e-3
-    max_sigma_m: float = 0.5
-    range_sigma_m: float = 0.05
-    bearing_sigma_rad: float = 0.01
-    map_sigma_m: float = 0.03
-    misread: float = 0.03
-    spurious: float = 0.1
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Objects:
     """K objects of one bundle that could be in the map.
@@ -71,7 +53,7 @@ class Objects:
 class Matcher:
     """Matches sets of objects to one map."""
 
-    def __init__(self, index: MapIndex, config: MatchConfig) -> None:
+    def __init__(self, index: MapIndex, config: LocalizeConfig) -> None:
         self.index, self.config = index, config
         self.evidence = ClassEvidence.of(index.names, index.class_of, config.misread)
         self.density = PairDensity.of(index.places, index.positions_xy)

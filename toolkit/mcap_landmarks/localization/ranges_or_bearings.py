@@ -1,7 +1,6 @@
 """Localize by ranges alone, which leave the heading open and often a mirror image, or by bearings alone."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from scipy.special import chdtri
@@ -11,6 +10,7 @@ from mcap_landmarks.estimation.bearings import solve_bearings
 from mcap_landmarks.estimation.pose import position_sigma
 from mcap_landmarks.estimation.ranges import PositionSolutions, solve_ranges
 from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.correspondences import Bools, Given, Problem
 from mcap_landmarks.localization.decision import Match
 from mcap_landmarks.maps.model import LandmarkMap
@@ -20,17 +20,6 @@ LEAST = 3
 """Objects that a position from ranges or bearings alone needs."""
 # Mirror images so close are one position.
 _SAME_SIGMAS = 3.0
-
-
-class Settings(Protocol):
-    """What of the stage's configuration is used here."""
-
-    @property
-    def max_sigma_m(self) -> float: ...
-    @property
-    def consistency(self) -> float: ...
-    @property
-    def accidental(self) -> float: ...
 
 
 def by_bearings(given: Given, mask: Bools) -> PoseSolutions:
@@ -44,16 +33,16 @@ def by_bearings(given: Given, mask: Bools) -> PoseSolutions:
 
 
 def locate_by_ranges(
-    problems: Sequence[Problem], given: Given, landmark_map: LandmarkMap, settings: Settings
+    problems: Sequence[Problem], given: Given, landmark_map: LandmarkMap, config: LocalizeConfig
 ) -> list[Match]:
     """Positions without heading of bundles of ranges; where the mirror image fits as well, both are candidates."""
     variance = given.covariance[..., 0, 0] + _landmark_variance(given)
     solved = solve_ranges(given.landmarks_xy, given.range_m, variance, mask=given.mask)
-    return [_judge(problem, i, solved, given, landmark_map, settings) for i, problem in enumerate(problems)]
+    return [_judge(problem, i, solved, given, landmark_map, config) for i, problem in enumerate(problems)]
 
 
 def _judge(
-    problem: Problem, i: int, solved: PositionSolutions, given: Given, landmark_map: LandmarkMap, settings: Settings
+    problem: Problem, i: int, solved: PositionSolutions, given: Given, landmark_map: LandmarkMap, config: LocalizeConfig
 ) -> Match:
     both, chi2_of = solved.position_xy[i], solved.chi2[i]
     position, covariance, dof = both[0], solved.covariance[i, 0], int(solved.dof[i])
@@ -61,11 +50,11 @@ def _judge(
     odds = np.exp(-(chi2_of - chi2_of[0]) / 2)
     apart = np.linalg.norm(both[1] - position) > _SAME_SIGMAS * sigma_m
     status = Status.LOCALIZED
-    if chi2_of[0] > chdtri(max(dof, 1), settings.consistency):
+    if chi2_of[0] > chdtri(max(dof, 1), config.consistency):
         status = Status.INCONSISTENT
-    elif sigma_m > settings.max_sigma_m:
+    elif sigma_m > config.max_sigma_m:
         status = Status.WEAK_GEOMETRY
-    elif apart and odds[1] > settings.accidental:
+    elif apart and odds[1] > config.accidental:
         status = Status.AMBIGUOUS
     k = len(problem.objects)
     off_m = np.abs(distances(position[None], given.pick(np.array([i])))[0, :k] - given.range_m[i, :k])

@@ -2,14 +2,14 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
 from mcap_landmarks.estimation.odometry import OdometryNoise
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.decision import Match
 from mcap_landmarks.localization.index import MapIndex
-from mcap_landmarks.localization.matching import MatchConfig, Matcher
+from mcap_landmarks.localization.matching import Matcher
 from mcap_landmarks.localization.sequence import Joiner
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.maps.neighbours import Neighbours
@@ -18,49 +18,18 @@ from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import OdometryAt
 
 
-class Settings(Protocol):
-    """What of the stage's configuration is used here."""
-
-    @property
-    def max_sigma_m(self) -> float: ...
-    @property
-    def max_sigma_deg(self) -> float: ...
-    @property
-    def range_sigma_m(self) -> float: ...
-    @property
-    def bearing_sigma_rad(self) -> float: ...
-    @property
-    def accidental(self) -> float: ...
-    @property
-    def join_m(self) -> float: ...
-    @property
-    def odometry_position_m(self) -> float: ...
-    @property
-    def odometry_heading_rad(self) -> float: ...
-    @property
-    def odometry_turning_rad(self) -> float: ...
-
-
 class JoinedLocator:
     """Localizes the scenes of one log in their order."""
 
-    def __init__(self, landmark_map: LandmarkMap, neighbours: Neighbours | None, settings: Settings) -> None:
-        self._settings = settings
-        limits = MatchConfig(
-            accidental=settings.accidental,
-            max_sigma_m=settings.max_sigma_m,
-            range_sigma_m=settings.range_sigma_m,
-            bearing_sigma_rad=settings.bearing_sigma_rad,
-        )
-        noise = OdometryNoise(
-            settings.odometry_position_m, settings.odometry_heading_rad, settings.odometry_turning_rad
-        )
-        self._matcher = Matcher(MapIndex.build(landmark_map, neighbours), limits)
-        self._joiner = Joiner(self._matcher, noise, settings.join_m)
+    def __init__(self, landmark_map: LandmarkMap, neighbours: Neighbours | None, config: LocalizeConfig) -> None:
+        self._config = config
+        noise = OdometryNoise(config.odometry_position_m, config.odometry_heading_rad, config.odometry_turning_rad)
+        self._matcher = Matcher(MapIndex.build(landmark_map, neighbours), config)
+        self._joiner = Joiner(self._matcher, noise, config.join_m)
 
     def locate(self, scenes: Sequence[SceneObjects], odometry: Sequence[OdometryAt | None]) -> list[Match]:
         """Pose of each scene's base in the map; single bundles only, where `join_m` is 0."""
-        if self._settings.join_m > 0:
+        if self._config.join_m > 0:
             found = [self._joiner.add(scene, at) for scene, at in zip(scenes, odometry, strict=True)]
         else:
             found = self._matcher.match(scenes)
@@ -68,6 +37,6 @@ class JoinedLocator:
 
     def _limited(self, match: Match) -> Match:
         """A heading that is too uncertain makes the pose too weak, however good the position."""
-        if match.covariance is None or np.degrees(np.sqrt(match.covariance[2, 2])) <= self._settings.max_sigma_deg:
+        if match.covariance is None or np.degrees(np.sqrt(match.covariance[2, 2])) <= self._config.max_sigma_deg:
             return match
         return Match(dataclasses.replace(match.message, status=Status.WEAK_GEOMETRY))

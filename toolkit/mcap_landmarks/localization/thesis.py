@@ -1,39 +1,32 @@
 """The thesis's way to localize (Algorithms 5 and 6): ordered class triples, the last match wins, range-only LM."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
 from mcap_landmarks.estimation.thesis import solve_position
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.decision import Match
 from mcap_landmarks.maps.model import Group, LandmarkMap
 from mcap_landmarks.messages.match import LandmarkMatch, Status
 from mcap_landmarks.messages.scene import SceneObjects
 
 
-class Settings(Protocol):
-    """What of the stage's configuration is used here."""
-
-    @property
-    def thesis_guess_m(self) -> tuple[float, float]: ...
-
-
 def locate_as_in_the_thesis(
-    scenes: Sequence[SceneObjects], landmark_map: LandmarkMap, settings: Settings
+    scenes: Sequence[SceneObjects], landmark_map: LandmarkMap, config: LocalizeConfig
 ) -> list[Match]:
     """Position of each scene of exactly three objects whose ordered classes are those of a group; it has no heading."""
     class_of = dict(zip(landmark_map.ids, landmark_map.classes, strict=True))
     last = {tuple(class_of[name] for name in group.landmark_ids): group for group in landmark_map.groups}
     position_of = dict(zip(landmark_map.ids, landmark_map.positions_xy, strict=True))
-    return [_locate(scene, last, position_of, settings) for scene in scenes]
+    return [_locate(scene, last, position_of, config) for scene in scenes]
 
 
 def _locate(
     scene: SceneObjects,
     groups: dict[tuple[str, ...], Group],
     position_of: dict[str, np.ndarray],
-    settings: Settings,
+    config: LocalizeConfig,
 ) -> Match:
     if len(scene) != 3:
         status = Status.TOO_FEW_OBJECTS if len(scene) < 3 else Status.NO_MATCH
@@ -45,7 +38,7 @@ def _locate(
         return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, Status.NO_MATCH))
     landmarks = np.stack([position_of[name] for name in group.landmark_ids])
     range_m = np.linalg.norm(scene.positions_xy[order], axis=1)
-    position = solve_position(landmarks, range_m, settings.thesis_guess_m)
+    position = solve_position(landmarks, range_m, config.thesis_guess_m)
     match = LandmarkMatch(
         scene.stamp_ns,
         scene.frame_id,

@@ -1,7 +1,6 @@
 """Localize where every landmark has a class of its own: associate by class, solve in SE(2), test, refuse."""
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,35 +11,24 @@ from mcap_landmarks.estimation.calibration import SensorModel, calibrate
 from mcap_landmarks.estimation.pose import position_sigma, solve_poses
 from mcap_landmarks.geometry.se2 import Array, transform_points
 from mcap_landmarks.localization.class_association import pairs_by_class, unique_classes
-from mcap_landmarks.localization.correspondences import Bools, Given, Problem, Rows, Sigmas
+from mcap_landmarks.localization.config import LocalizeConfig
+from mcap_landmarks.localization.correspondences import Bools, Given, Problem, Rows
 from mcap_landmarks.localization.decision import Match
 from mcap_landmarks.localization.ranges_or_bearings import LEAST, by_bearings, distances, locate_by_ranges
-from mcap_landmarks.localization.ranges_or_bearings import Settings as OneKindSettings
 from mcap_landmarks.localization.validation import check_scale
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.messages.match import LandmarkMatch, Status
 from mcap_landmarks.messages.scene import SceneObjects
 
 
-class Settings(Sigmas, OneKindSettings, Protocol):
-    """What of the stage's configuration is used here."""
-
-    @property
-    def max_sigma_deg(self) -> float: ...
-    @property
-    def robust_dof(self) -> float: ...
-    @property
-    def calibrate(self) -> bool: ...
-
-
 class UniqueLocator:
     """Localizes the scenes of one log, batch by batch; what its sensor's ranges mean is found from the first batch."""
 
-    def __init__(self, landmark_map: LandmarkMap, settings: Settings) -> None:
+    def __init__(self, landmark_map: LandmarkMap, config: LocalizeConfig) -> None:
         self._map = landmark_map
-        self._settings = settings
+        self._config = config
         self._landmark_of = unique_classes(landmark_map)
-        self._sensor: SensorModel | None = None if settings.calibrate else SensorModel()
+        self._sensor: SensorModel | None = None if config.calibrate else SensorModel()
 
     def locate(self, scenes: Sequence[SceneObjects]) -> list[Match]:
         """Pose of each scene's base in the map, from the landmarks whose class is unique."""
@@ -54,7 +42,7 @@ class UniqueLocator:
 
     def _located(self, problems: Sequence[Problem]) -> list[Match]:
         """Locate all, those of ranges or bearings alone as such."""
-        given = Given.of(problems, self._map, self._settings)
+        given = Given.of(problems, self._map, self._config)
         ranges, bearings = given.ranges_alone(), given.bearings_alone()
         many = given.mask.sum(axis=1) >= LEAST
         few = np.flatnonzero((ranges | bearings) & ~many).tolist()
@@ -68,14 +56,14 @@ class UniqueLocator:
 
         put(~ranges & ~bearings, self._solve)
         put(bearings & many, self._by_bearings)
-        put(ranges & many, lambda chosen, part: locate_by_ranges(chosen, part, self._map, self._settings))
+        put(ranges & many, lambda chosen, part: locate_by_ranges(chosen, part, self._map, self._config))
         return [found[i] for i in range(len(problems))]
 
     def _by_bearings(self, problems: Sequence[Problem], given: Given) -> list[Match]:
-        solved, mask, fits = _fitting(lambda mask: by_bearings(given, mask), given.mask, LEAST, self._settings)
+        solved, mask, fits = _fitting(lambda mask: by_bearings(given, mask), given.mask, LEAST, self._config)
         distance_m = distances(solved.map_from_base, given)
         return [
-            _judge(problem, i, solved, mask[i], distance_m[i], bool(fits[i]), self._map, self._settings)
+            _judge(problem, i, solved, mask[i], distance_m[i], bool(fits[i]), self._map, self._config)
             for i, problem in enumerate(problems)
         ]
 
@@ -85,7 +73,7 @@ class UniqueLocator:
         Raises:
             MapError: map and log are in different units.
         """
-        settings = self._settings
+        config = self._config
         check_scale(
             [problem.scene.positions_xy[problem.objects] for problem in problems],
             [self._map.positions_xy[problem.landmarks] for problem in problems],
@@ -112,24 +100,24 @@ class UniqueLocator:
                 noise,
                 landmark_covariance=given.landmark_covariance,
                 mask=mask,
-                robust_dof=settings.robust_dof or None,
+                robust_dof=config.robust_dof or None,
             )
 
-        solutions, mask, fits = _fitting(solve, given.mask, 2, settings)
+        solutions, mask, fits = _fitting(solve, given.mask, 2, config)
         return [
-            _judge(problem, i, solutions, mask[i], distance_m[i], bool(fits[i]), self._map, settings)
+            _judge(problem, i, solutions, mask[i], distance_m[i], bool(fits[i]), self._map, config)
             for i, problem in enumerate(problems)
         ]
 
 
 def _fitting(
-    solve: Callable[[Bools], PoseSolutions], mask: Bools, least: int, settings: Settings
+    solve: Callable[[Bools], PoseSolutions], mask: Bools, least: int, config: LocalizeConfig
 ) -> tuple[PoseSolutions, Bools, Bools]:
     """Solutions without the worst of what does not fit, of which `least` stay; what (B, K) stays; who (B,) fits."""
     mask = mask.copy()
     while True:
         solutions = solve(mask)
-        fits = solutions.chi2 <= chdtri(np.maximum(solutions.dof, 1), settings.consistency)
+        fits = solutions.chi2 <= chdtri(np.maximum(solutions.dof, 1), config.consistency)
         worse: Rows = np.flatnonzero(~fits & (mask.sum(axis=1) > least))
         if not len(worse):
             return solutions, mask, fits
@@ -157,7 +145,7 @@ def _judge(
     distance_m: Array,
     fits: bool,
     landmark_map: LandmarkMap,
-    settings: Settings,
+    config: LocalizeConfig,
 ) -> Match:
     scene, kept = problem.scene, np.flatnonzero(used)
     objects, landmarks = problem.objects[kept], problem.landmarks[kept]
@@ -168,7 +156,7 @@ def _judge(
     status = Status.LOCALIZED
     if not fits:
         status = Status.INCONSISTENT
-    elif not solutions.converged[i] or sigma_m > settings.max_sigma_m or sigma_deg > settings.max_sigma_deg:
+    elif not solutions.converged[i] or sigma_m > config.max_sigma_m or sigma_deg > config.max_sigma_deg:
         status = Status.WEAK_GEOMETRY
     points = scene.positions_xy[objects]
     points = points * (distance_m[kept] / np.maximum(np.hypot(points[:, 0], points[:, 1]), 1e-9))[:, None]

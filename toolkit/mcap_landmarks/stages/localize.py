@@ -1,10 +1,8 @@
 """Localize every bundle of scene objects in a landmark map."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -23,6 +21,7 @@ from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.geometry.se2 import compose, inverse
 from mcap_landmarks.localization.class_association import unique_classes
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.decision import Match
 from mcap_landmarks.localization.repeated_classes import JoinedLocator
 from mcap_landmarks.localization.thesis import locate_as_in_the_thesis
@@ -43,45 +42,6 @@ _BATCH, _FOLLOWED = 4096, 64
 _NO_FRAME = "transforms from the map to odometry that were not written, as odometry names no frame of its own"
 
 Locate = Callable[[Sequence[SceneObjects], Sequence[OdometryAt | None]], list[Match]]
-
-
-@dataclass(frozen=True, slots=True)
-class LocalizeConfig:
-    """How bundles are localized.
-
-    `max_sigma_m`: a pose whose own position sigma (square root of the largest eigenvalue) is above it is refused, and
-    so is one whose heading sigma is above `max_sigma_deg`: three of them are the 20 degrees that make a pose false.
-    `range_sigma_m` and `bearing_sigma_rad` stand in for covariances that the log leaves unknown.
-
-    Where every class stands for one landmark: `robust_dof`, degrees of the Student-t distribution that observations
-    weigh by (0 weighs them by their covariance alone); `consistency`, the probability under which a set of objects that
-    do fit is refused; `calibrate` finds from the first bundles whether ranges are distances or depths, and their
-    offset, and corrects them where that explains far more than chance. Objects whose covariance leaves the bearing open
-    (a sigma beyond a radian) or the range (beyond the range itself) count by what is left, three of them or more.
-
-    Where classes repeat: `accidental`, the most accidental matches to expect of a match that is accepted; `join_m`,
-    over how many metres bundles are matched together (0: each alone), through odometry whose noise per square root of
-    a metre or radian is `odometry_position_m`, `odometry_heading_rad` and `odometry_turning_rad`.
-
-    `tf`: write map -> odom, or never. `thesis_guess_m`: the fixed initial guess of the thesis's solver, which the
-    thesis does not print.
-    """
-
-    method: Literal["default", "thesis"] = "default"
-    max_sigma_m: float = 0.5
-    max_sigma_deg: float = 6.5
-    range_sigma_m: float = 0.05
-    bearing_sigma_rad: float = 0.01
-    robust_dof: float = 0.0
-    consistency: float = 1e-3
-    calibrate: bool = True
-    accidental: float = 2e-3
-    join_m: float = 30.0
-    odometry_position_m: float = 0.05
-    odometry_heading_rad: float = 0.05
-    odometry_turning_rad: float = 0.1
-    tf: Literal["auto", "never"] = "auto"
-    thesis_guess_m: tuple[float, float] = (0.0, 0.0)
 
 
 def process(
