@@ -10,7 +10,7 @@ from typing import TypeVar, cast
 import numpy as np
 from mcap_landmarks.estimation.odometry import OdometryNoise
 from mcap_landmarks.geometry.se2 import between
-from mcap_landmarks.localization.decision import Match
+from mcap_landmarks.localization.match import Match
 from mcap_landmarks.localization.matching import Matcher
 from mcap_landmarks.localization.sequence import Joiner
 from mcap_landmarks.stage import OdometryAt

@@ -6,17 +6,26 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from mcap_landmarks.channels import CAMERA_IMAGE, DETECTIONS, SCAN, SCAN_OBJECTS, TF_STATIC
+from mcap_landmarks.channels import CAMERA_IMAGE, DETECTIONS, MATCH, POSE, SCAN, SCAN_OBJECTS, SCENE_OBJECTS, TF_STATIC
+from mcap_landmarks.localization.config import LocalizeConfig
+from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import Image
+from mcap_landmarks.messages.match import Status
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.stage import Bundle
 
 from tests.cli.calls import call, schema_of
 from tests.diff.recordings import START_NS, localized_log, localized_messages, write
+from tests.localization.logs import bundles, localized, unique_classes, write_log
+from tests.stages.test_localize_one_kind import AROUND, located, poses, scene
 
 PNG = b"\x89PNG"
+GOLDEN = Path(__file__).parents[1] / "golden" / "localize.mcap"
+BEFORE_CONDITIONS = Path(__file__).parents[1] / "data" / "localize_without_conditions.mcap"
 
 
 def sensed(stamp_ns: int):  # type: ignore[no-untyped-def] # noqa: ANN201 - entries of a log
@@ -84,3 +93,88 @@ def test_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert "no bundle with scene objects within 3 s of 5" in capsys.readouterr().err
     assert call("explain", log, "--at", START_NS, "-o", tmp_path / "e.gif") == 2
     assert call("explain", log, "--at", "yesterday") == 2
+
+
+def read(log: Path, channel):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN201 - of the channel's type
+    """The messages of one channel by their time."""
+    with open_recording(log) as recording:
+        raws = list(recording.messages(recording.connections(channel.topic)))
+        return {raw.log_time_ns: decode(channel.message, raw.data, raw.connection.schema.decode()) for raw in raws}
+
+
+def explained(log: Path, time_ns: int, capsys: pytest.CaptureFixture[str]):  # type: ignore[no-untyped-def] # noqa: ANN201
+    capsys.readouterr()
+    assert call("explain", log, "--at", time_ns, "--json") == 0
+    document = json.loads(capsys.readouterr().out)
+    jsonschema.validate(document, schema_of("explain"))
+    return document
+
+
+def agrees(log: Path, capsys: pytest.CaptureFixture[str], every: int = 1) -> set[str]:
+    """Hold what localize published against its conditions, and explanations of it; the statuses that were met."""
+    matches, poses, statuses = read(log, MATCH), read(log, POSE), set()
+    for match in matches.values():
+        assert match.conditions
+        assert (match.status is Status.LOCALIZED) is all(one.held for one in match.conditions)
+    for time_ns, match in list(matches.items())[::every]:
+        document = explained(log, match.stamp_ns, capsys)
+        statuses.add(document["status"])
+        assert document["status"] == match.status.name.lower()
+        assert (document["status"] == "localized") is all(one["holds"] for one in document["conditions"])
+        asked = [(one["name"], one["value"], one["limit"], one["holds"]) for one in document["conditions"]]
+        assert asked == [tuple(one) for one in match.conditions]
+        told = {one["id"]: (one["landmark"], one["residual_m"]) for one in document["objects"]}
+        for name, landmark, residual_m in zip(match.object_ids, match.landmark_ids, match.residual_m, strict=True):
+            assert told[name] == (landmark, residual_m)
+        if time_ns in poses:
+            x, y, heading = poses[time_ns].pose.tolist()
+            shown = document["places"][0]["pose"]
+            assert (shown["x_m"], shown["y_m"], shown["heading_deg"]) == (x, y, pytest.approx(np.degrees(heading)))
+            (sigma_m,) = [one.value for one in match.conditions if one.name == "position_sigma_m"]
+            assert document["places"][0]["sigma_m"] == pytest.approx(sigma_m)
+    return statuses
+
+
+def test_the_explanation_is_what_localize_decided(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert agrees(GOLDEN, capsys, every=8) == {"localized"}
+    world = unique_classes()
+    seen = bundles(*world, count=24)
+    results = localized(tmp_path, *world, seen, LocalizeConfig(max_sigma_m=0.03, max_sigma_deg=0.3))
+    log = write_log(tmp_path / "unique.mcap", seen, results)
+    assert agrees(log, capsys) == {"localized", "too_few_objects", "inconsistent", "weak_geometry"}
+
+
+def test_a_log_from_before_conditions_were_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of one with the definition that LandmarkMatch had then, all is told but for what it does not hold."""
+    matches = read(BEFORE_CONDITIONS, MATCH)
+    assert len(matches) == 9
+    for match in matches.values():
+        assert match.conditions == ()
+        document = explained(BEFORE_CONDITIONS, match.stamp_ns, capsys)
+        assert (document["status"], document["conditions"]) == ("localized", None)
+        assert document["places"][0]["landmarks"] == list(match.landmark_ids)
+    assert call("explain", BEFORE_CONDITIONS, "--at", match.stamp_ns, "-o", tmp_path / "e.png") == 0
+    said = capsys.readouterr().out
+    assert "The log does not tell the conditions of its matches; run localize on it again." in said
+    assert "holds" not in said
+
+
+def test_a_log_without_matches(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bare = [entry for entry in localized_messages() if entry[0] not in {MATCH, POSE}]
+    assert call("explain", write(tmp_path / "r.mcap", bare), "--at", START_NS) == 0
+    assert "There is no match to explain; run localize on the log." in capsys.readouterr().out
+
+
+def test_a_position_without_heading(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Ranges alone leave the heading open: none is told or drawn."""
+    results = located(tmp_path, AROUND, 3, ranges=True)
+    rng = np.random.default_rng(5)
+    scenes = [scene(i + 1, pose, AROUND, rng, ranges=True) for i, pose in enumerate(poses(3))]
+    seen = [Bundle(one.stamp_ns, one.stamp_ns, {SCENE_OBJECTS: one}, None) for one in scenes]
+    log = write_log(tmp_path / "ranges.mcap", seen, results)
+    (place,) = explained(log, 2, capsys)["places"]
+    assert place["pose"]["heading_deg"] is None
+    np.testing.assert_allclose([place["pose"]["x_m"], place["pose"]["y_m"]], poses(3)[1, :2], atol=0.15)
+    assert call("explain", log, "--at", 2, "-o", tmp_path / "e.svg") == 0
+    assert "heading unknown" in (tmp_path / "e.svg").read_text()
+    assert "holds  mirror_odds: 0 odds of the mirror image" in capsys.readouterr().out

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from mcap_landmarks.channels import MAP, MATCH, POSE, POSE_COVARIANCE, SCENE_OBJECTS, TRUTH_OBJECTS, TRUTH_POSE
 from mcap_landmarks.messages.codec import Message
-from mcap_landmarks.messages.match import LandmarkMatch, Status
+from mcap_landmarks.messages.match import Condition, LandmarkMatch, Status
 from mcap_landmarks.messages.poses import PoseStamped, PoseWithCovarianceStamped
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.stage import Channel, Stamped
@@ -28,7 +28,12 @@ def localized_messages() -> Iterable[tuple[Channel, int, Message]]:
         yield SCENE_OBJECTS, stamp_ns, scene(names, [[3.0, 0], [0, 3]][: len(names)], stamp_ns)
         status = {2: Status.AMBIGUOUS, 3: Status.TOO_FEW_OBJECTS}.get(i, Status.LOCALIZED)
         matched = ("s", "p") if status is Status.LOCALIZED else ()
-        yield MATCH, stamp_ns, LandmarkMatch(stamp_ns, "base_footprint", status, landmark_ids=matched)
+        asked = (
+            Condition("objects", len(names), 2, held=len(names) >= 2),
+            Condition("expected_accidental", 0.3 if i == 2 else 1e-9, 2e-3, held=i != 2),
+        )
+        found = LandmarkMatch(stamp_ns, "base_footprint", status, landmark_ids=matched, conditions=asked)
+        yield MATCH, stamp_ns, found
         if status is Status.LOCALIZED:
             pose = truth + [[OFF_M, 0, 0], [0, 0, 0], [], [], [0, 2.0, 0]][i]
             yield POSE, stamp_ns, PoseStamped.planar(stamp_ns, "map", pose)

@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 from mcap_landmarks import channels
 from mcap_landmarks.diff import logs as diff_logs
 from mcap_landmarks.diff.comparison import diff
-from mcap_landmarks.messages.codec import encode
+from mcap_landmarks.messages.codec import decode, encode
+from mcap_landmarks.messages.match import Condition, LandmarkMatch, Status
 from mcap_landmarks.messages.poses import PoseStamped
+from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import create_recording
-from mcap_landmarks.stage import RawMessage
+from mcap_landmarks.stage import RawMessage, Stamped
 
 from tests.diff.changes import CHANGES, SAME, replace, shifted
 from tests.diff.recordings import localized_log, localized_messages, write
@@ -200,3 +202,29 @@ def test_truth_may_come_from_elsewhere(tmp_path: Path) -> None:
     assert not diff(mine, theirs).document["metrics"]
     metrics = diff(mine, theirs, reference=log).document["metrics"]
     assert metrics["scored"] == {"baseline": 3, "candidate": 2, "delta": -1}
+
+
+def test_of_a_message_that_has_grown_the_fields_of_both_are_compared(tmp_path: Path) -> None:
+    """Results from before conditions were written, and the same ones with them."""
+    old = Path(__file__).parents[1] / "data" / "localize_without_conditions.mcap"
+    changed = []
+    with open_recording(old) as recording, create_recording(tmp_path / "new.mcap") as writer:
+        for raw in recording.messages():
+            if raw.connection.topic != channels.MATCH.topic:
+                writer.write(raw)
+                continue
+            match = decode(LandmarkMatch, raw.data, raw.connection.schema.decode())
+            asked = (Condition("objects", 6.0, 2.0, held=True),)
+            match = dataclasses.replace(match, conditions=asked)
+            if not changed:
+                changed.append(raw.log_time_ns)
+                match = dataclasses.replace(match, status=Status.AMBIGUOUS)
+            writer.add(Stamped(channels.MATCH, raw.log_time_ns, match))
+    for baseline, candidate, side in (("old", "new", "candidate"), ("new", "old", "baseline")):
+        paths = {"old": old, "new": tmp_path / "new.mcap"}
+        document = diff(paths[baseline], paths[candidate]).document
+        assert [(row["what"], row["name"]) for row in document["structure"]] == [("definition", "/landmarks/match")]
+        channel = document["channels"]["/landmarks/match"]
+        assert counts(channel) == (1, 0, 0)
+        assert set(channel["fields"]) == {"status"}
+        assert channel["worst"][0][side] == "ambiguous"

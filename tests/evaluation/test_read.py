@@ -163,3 +163,12 @@ def test_a_message_that_cannot_be_read_is_a_loss(tmp_path: Path) -> None:
     outcome, _, losses = read_run(path)
     assert losses == ["/landmarks/match: 2 messages could not be decoded"]
     assert outcome.bundles == 0
+
+
+def test_a_log_from_before_conditions_were_written() -> None:
+    """Its LandmarkMatch ends earlier than ours, and says so in its own definition."""
+    outcome, _, losses = read_run(Path(__file__).parents[1] / "data" / "localize_without_conditions.mcap")
+    assert losses == []
+    assert (outcome.bundles, len(outcome.trajectory), len(outcome.seen)) == (9, 9, 9)
+    assert outcome.statuses is not None
+    assert outcome.statuses["localized"] == 9

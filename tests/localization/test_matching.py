@@ -8,8 +8,8 @@ from mcap_landmarks.errors import MapError
 from mcap_landmarks.estimation.odometry import OdometryNoise
 from mcap_landmarks.geometry.se2 import between
 from mcap_landmarks.localization.config import LocalizeConfig
-from mcap_landmarks.localization.decision import Match
 from mcap_landmarks.localization.index import MapIndex
+from mcap_landmarks.localization.match import Match
 from mcap_landmarks.localization.matching import Matcher
 from mcap_landmarks.localization.sequence import Joiner
 from mcap_landmarks.maps.model import LandmarkMap, Source

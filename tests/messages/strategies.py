@@ -7,7 +7,7 @@ from mcap_landmarks.messages.annotations import ImageAnnotations, Label, Outline
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.markers import Marker, MarkerArray, Shape
-from mcap_landmarks.messages.match import LandmarkMatch, Status
+from mcap_landmarks.messages.match import Condition, LandmarkMatch, Status
 from mcap_landmarks.messages.numbers import UInt8
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.poses import Odometry, Path, PoseStamped, PoseWithCovarianceStamped
@@ -87,6 +87,7 @@ match = st.builds(
     number,
     st.integers(0, 99),
     st.integers(0, 99),
+    st.lists(st.builds(Condition, text, number, number, st.booleans()), max_size=3).map(tuple),
 )
 MESSAGES = st.one_of(
     pose_stamped,

@@ -1,5 +1,6 @@
 """Say why a bundle was localized or not, in words and as a picture."""
 
+import math
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +11,7 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, say_json, table
 
 if TYPE_CHECKING:
-    from mcap_landmarks.evaluation.explain import Condition, Place, Situation
+    from mcap_landmarks.evaluation.explain import Place, Situation
 
 
 def command(
@@ -24,14 +25,13 @@ def command(
     """Say what was detected, clustered and fused at TIME, which places of the map came into question, and which
     condition of a match held or failed, by how much.
     """
-    from mcap_landmarks.evaluation.explain import conditions_of, places_of
+    from mcap_landmarks.evaluation.explain import places_of
     from mcap_landmarks.report.explain_reading import read_situation
     from mcap_landmarks.report.plots import form_of
 
     form = form_of(output) if output else ""
     situation, view = read_situation(result, options.time_ns(at, "--at") or 0)
     places = places_of(situation)
-    conditions = conditions_of(situation, places)
     if output:
         from functools import partial
 
@@ -43,16 +43,18 @@ def command(
         with atomic_file(output) as stream:
             save(partial(explanation_figure, situation, places, view, title), stream, form)
     if json:
-        say_json("explain", _document(situation, places, conditions))
+        say_json("explain", _document(situation, places))
     else:
-        _print(situation, places, conditions)
+        _print(situation, places)
 
 
 def _status(situation: "Situation") -> str:
     return "not matched yet" if situation.match is None else situation.match.status.name.lower()
 
 
-def _print(situation: "Situation", places: "tuple[Place, ...]", conditions: "tuple[Condition, ...]") -> None:
+def _print(situation: "Situation", places: "tuple[Place, ...]") -> None:
+    from mcap_landmarks.localization.decision import told
+
     match = situation.match
     before = match.bundles_joined - 1 if match is not None else 0
     joined = f", judged together with what {before} bundles before it saw" if before > 0 else ""
@@ -66,12 +68,13 @@ def _print(situation: "Situation", places: "tuple[Place, ...]", conditions: "tup
     if places:
         say()
         _print_places(places)
-    if conditions:
-        say()
-        for condition in conditions:
-            say(f"{'holds' if condition.holds else 'FAILS'}  {condition.name}: {condition.words}")
-    elif match is None:
+    say()
+    if match is None:
         say("There is no match to explain; run localize on the log.")
+    elif not match.conditions:
+        say("The log does not tell the conditions of its matches; run localize on it again.")
+    for condition in () if match is None else match.conditions:
+        say(f"{'holds' if condition.held else 'FAILS'}  {condition.name}: {told(condition)}")
 
 
 def _detected(situation: "Situation") -> str:
@@ -111,7 +114,8 @@ def _fused(situation: "Situation") -> str:
 def _print_objects(situation: "Situation", places: "tuple[Place, ...]") -> None:
     rows = []
     for entry in _objects(situation, places):
-        off = "-" if entry["residual_m"] is None else f"{entry['residual_m']:.3f} m, {entry['sigmas']:.1f} sigma"
+        off = "-" if entry["residual_m"] is None else f"{entry['residual_m']:.3f} m"
+        off += "" if entry["sigmas"] is None else f", {entry['sigmas']:.1f} sigma"
         rows.append(
             [
                 entry["id"] or "-",
@@ -132,10 +136,11 @@ def _objects(situation: "Situation", places: "tuple[Place, ...]") -> list[dict[s
     scene = situation.scene
     if scene is None:
         return []
-    paired: dict[int, tuple[str, float, float]] = {}
+    paired: dict[int, tuple[str, float, float | None]] = {}
     for place in places[:1]:
-        if place.residual_m is not None and place.sigmas is not None:
-            off = zip(place.landmark_ids, place.residual_m.tolist(), place.sigmas.tolist(), strict=True)
+        if place.residual_m is not None:
+            sigmas = [None] * len(place.rows) if place.sigmas is None else place.sigmas.tolist()
+            off = zip(place.landmark_ids, place.residual_m.tolist(), sigmas, strict=True)
             paired = dict(zip(place.rows.tolist(), off, strict=True))
     found = []
     for i, name in enumerate(scene.ids):
@@ -168,10 +173,10 @@ def _print_places(places: "tuple[Place, ...]") -> None:
         if place.pose is not None:
             x, y, heading = _pose(place)
             fit = [
-                f"{x:.2f} m, {y:.2f} m, {heading:.1f} deg",
+                f"{x:.2f} m, {y:.2f} m, " + ("-" if math.isnan(heading) else f"{heading:.1f} deg"),
                 f"{place.chi2:.1f} / {place.dof}",
                 f"{max(place.residual_m):.3f} m" if place.residual_m is not None else "-",
-                f"{place.sigma_m:.3f} m",
+                "-" if math.isnan(place.sigma_m) else f"{place.sigma_m:.3f} m",
             ]
         share = f"{place.share:.4f}" if place.share == place.share else "-"
         rows.append([str(number), share, *fit, " ".join(place.landmark_ids)])
@@ -186,9 +191,9 @@ def _pose(place: "Place") -> tuple[float, float, float]:
     return x, y, float(np.degrees(heading))
 
 
-def _document(
-    situation: "Situation", places: "tuple[Place, ...]", conditions: "tuple[Condition, ...]"
-) -> dict[str, Any]:
+def _document(situation: "Situation", places: "tuple[Place, ...]") -> dict[str, Any]:
+    from mcap_landmarks.localization.decision import told
+
     match, found = situation.match, situation.detections
     return {
         "stamp_ns": situation.stamp_ns,
@@ -214,15 +219,11 @@ def _document(
             }
             for place in places
         ],
-        "conditions": [
-            {
-                "name": one.name,
-                "value": one.value,
-                "limit": one.limit,
-                "holds": one.holds,
-                "words": one.words,
-            }
-            for one in conditions
+        "conditions": None
+        if match is None or not match.conditions
+        else [
+            {"name": one.name, "value": one.value, "limit": one.limit, "holds": one.held, "words": told(one)}
+            for one in match.conditions
         ],
     }
 

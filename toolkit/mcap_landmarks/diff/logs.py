@@ -39,12 +39,14 @@ class Topic:
     """One topic of either recording, and its messages that still wait for their partner.
 
     Its messages are compared by fields if both sides describe them alike, else, and where they carry images or the
-    like, by their bytes. `form` is their type if it is one of ours.
+    like, by their bytes. Of a type that has grown at its end between the two, the fields that both have are compared.
+    `layouts` are those of both sides; `form` is their type if it is one of ours; `fields` are those of both.
     """
 
     ros_type: str
-    layout: Layout | None
+    layouts: tuple[Layout, Layout] | None
     form: str
+    fields: frozenset[str]
     diff: ChannelDiff
     waiting: tuple[list[_Held], list[_Held]] = field(default_factory=lambda: ([], []))
 
@@ -52,15 +54,17 @@ class Topic:
     def of(cls, baseline: Connections, candidate: Connections, tolerance: Callable[[str], Tolerance]) -> "Topic":
         """The topic of these connections, of one side at least."""
         connections = (*baseline, *candidate)
-        ros_type, layout = connections[0].message_type, shared_layout(connections)
-        form = ros_type if layout and _is_ours(ros_type, layout) else ""
-        if layout and layout.has_payload:
-            layout, form = None, ""
-        return cls(ros_type, layout, form, ChannelDiff(ros_type, tolerance, unit_of(form)))
+        ros_type, layouts = connections[0].message_type, _layouts(baseline or candidate, candidate or baseline)
+        if layouts and layouts[0].has_payload:
+            layouts = None
+        form = ros_type if layouts and _is_ours(ros_type, layouts) else ""
+        empty = [frozenset(compared(form, layout.table([])).fields.columns) for layout in layouts or ()]
+        fields = frozenset.intersection(*empty) if empty else frozenset()
+        return cls(ros_type, layouts, form, fields, ChannelDiff(ros_type, tolerance, unit_of(form)))
 
     def field_names(self) -> tuple[str, ...]:
         """The fields that are compared; those of a list's messages begin with `message.`."""
-        found = self._read([])
+        found = self._read(0, [])
         names = tuple(found.fields.columns)
         if found.items is None:
             return names
@@ -69,9 +73,9 @@ class Topic:
     def hold(self, side: int, raw: RawMessage) -> int:
         """Keep a message until its partner comes; the bytes that this takes."""
         data, key_ns = bytes(raw.data), raw.log_time_ns
-        if self.layout is None:
+        if self.layouts is None:
             data = _digest(data)
-        elif self.layout.stamped and len(data) >= 12:
+        elif self.layouts[side].stamped and len(data) >= 12:
             seconds, nanoseconds = _STAMP.unpack_from(data, 4)
             key_ns = seconds * 10**9 + nanoseconds or key_ns
         self.waiting[side].append(_Held(key_ns, raw.log_time_ns, data))
@@ -87,46 +91,52 @@ class Topic:
             [mine[row] for row in pairs.removed.tolist()],
             [theirs[row] for row in pairs.added.tolist()],
         )
-        self._give_up("removed", mine, until_ns)
-        self._give_up("added", theirs, until_ns)
+        self._give_up(0, until_ns)
+        self._give_up(1, until_ns)
         return sum(len(held.data) for waiting in self.waiting for held in waiting)
 
     def _compare_partners(self, partners: Sequence[tuple[_Held, _Held]]) -> None:
         """Compare messages that belong together; those with the same bytes are read once."""
-        for sides_read, _ in self._batches([mine for mine, theirs in partners if mine == theirs]):
+        for sides_read, _ in self._batches(0, [mine for mine, theirs in partners if mine == theirs]):
             self.diff.equal(sides_read[0])
         others = [(mine, theirs) for mine, theirs in partners if mine != theirs]
-        for sides_read, times in self._batches([mine for mine, _ in others], [theirs for _, theirs in others]):
+        for sides_read, times in self._batches(0, [mine for mine, _ in others], [theirs for _, theirs in others]):
             self.diff.pair(sides_read[0], sides_read[1], times)
 
-    def _give_up(self, side: str, waiting: list[_Held], until_ns: int) -> None:
-        """Count messages that are too old to meet a partner any more as `removed` or `added`."""
-        for sides_read, times in self._batches([held for held in waiting if held.log_time_ns < until_ns]):
-            self.diff.only(side, sides_read[0], times)
+    def _give_up(self, side: int, until_ns: int) -> None:
+        """Count messages of one side that are too old to meet a partner any more as `removed` or `added`."""
+        waiting = self.waiting[side]
+        for sides_read, times in self._batches(side, [held for held in waiting if held.log_time_ns < until_ns]):
+            self.diff.only("added" if side else "removed", sides_read[0], times)
         waiting[:] = [held for held in waiting if held.log_time_ns >= until_ns]
 
-    def _batches(self, *sides: Sequence[_Held]) -> Iterator[tuple[list[ComparedMessages], Rows]]:
-        """Messages that belong together, side by side, and their times; those that cannot be read are seen as bytes."""
+    def _batches(self, first: int, *sides: Sequence[_Held]) -> Iterator[tuple[list[ComparedMessages], Rows]]:
+        """Messages that belong together, side by side, and their times; those that cannot be read are seen as bytes.
+
+        `first` is the side, 0 or 1, of those that are named first.
+        """
         count = len(sides[0])
         if not count:
             return
         try:
-            sides_read = [self._read(side) for side in sides]
+            sides_read = [self._read(first + i, messages) for i, messages in enumerate(sides)]
         except MessageError:
             if count > 1:
-                yield from self._batches(*(side[: count // 2] for side in sides))
-                yield from self._batches(*(side[count // 2 :] for side in sides))
+                yield from self._batches(first, *(side[: count // 2] for side in sides))
+                yield from self._batches(first, *(side[count // 2 :] for side in sides))
                 return
             sides_read = [_content([_digest(held.data) for held in side]) for side in sides]
         yield sides_read, np.array([held.key_ns for held in sides[0]], dtype=np.int64)
 
-    def _read(self, messages: Sequence[_Held]) -> ComparedMessages:
-        if self.layout is None:
+    def _read(self, side: int, messages: Sequence[_Held]) -> ComparedMessages:
+        if self.layouts is None:
             return _content([held.data for held in messages])
-        found = compared(self.form, self.layout.table([held.data for held in messages]))
+        found = compared(self.form, self.layouts[side].table([held.data for held in messages]))
         logged = np.array([held.log_time_ns for held in messages], dtype=np.int64)
-        columns = {**found.fields.columns, "log_time_ns": Column(Kind.TIME, logged[:, None])}
-        return ComparedMessages(found.rows, Fields(columns, found.fields.counted), found.items)
+        columns = {name: column for name, column in found.fields.columns.items() if name in self.fields}
+        columns["log_time_ns"] = Column(Kind.TIME, logged[:, None])
+        counted = tuple(name for name in found.fields.counted if name in self.fields)
+        return ComparedMessages(found.rows, Fields(columns, counted), found.items)
 
 
 def compare_messages(
@@ -153,15 +163,25 @@ def shared_layout(connections: Collection[Connection]) -> Layout | None:
     return first if all(layout.definition == first.definition for layout in layouts) else None
 
 
+def _layouts(baseline: Connections, candidate: Connections) -> tuple[Layout, Layout] | None:
+    """How the messages of each side lie in their bytes; None if unknown, or if neither has grown from the other."""
+    mine, theirs = shared_layout(baseline), shared_layout(candidate)
+    if mine is None or theirs is None or not (mine.begins(theirs) or theirs.begins(mine)):
+        return None
+    return mine, theirs
+
+
 def _layout(connection: Connection) -> Layout:
     if (connection.message_encoding, connection.schema_encoding) != ("cdr", "ros2msg"):
         raise MessageError(f"{connection.topic}: is not CDR described in ros2msg")
     return layout_of(connection.message_type, connection.schema.decode())
 
 
-def _is_ours(ros_type: str, layout: Layout) -> bool:
-    known = ros_type in typestore().fielddefs
-    return known and layout.definition == layout_of(ros_type, definition(ros_type)).definition
+def _is_ours(ros_type: str, layouts: tuple[Layout, Layout]) -> bool:
+    if ros_type not in typestore().fielddefs:
+        return False
+    ours = layout_of(ros_type, definition(ros_type)).definition
+    return any(layout.definition == ours for layout in layouts)
 
 
 def _side(

@@ -21,7 +21,7 @@ from mcap_landmarks.messages.match import LandmarkMatch, Status
 from mcap_landmarks.messages.parts import PLANAR
 from mcap_landmarks.messages.poses import PoseStamped, PoseWithCovarianceStamped
 from mcap_landmarks.messages.scene import SceneObjects
-from mcap_landmarks.messages.typestore import definition
+from mcap_landmarks.messages.typestore import definition_in
 from mcap_landmarks.stage import Channel
 
 Flags = NDArray[np.bool_]
@@ -46,22 +46,24 @@ class Collected:
     broken: Counter[str] = field(default_factory=Counter)
     losses: list[str] = field(default_factory=list)
 
-    def add(self, channel: Channel[Message], logged_ns: Sequence[int], messages: Sequence[bytes]) -> None:
+    def add(self, channel: Channel[Message], schema: str, logged_ns: Sequence[int], messages: Sequence[bytes]) -> None:
         """Take messages of a channel, in the order of their log times; those that cannot be decoded are counted.
+
+        `schema` is how the log defines their type: it may be of an earlier version.
 
         Raises:
             RecordingError: a pose is not finite.
         """
         ros_type = channel.message.ROS_TYPE
         try:
-            table = layout_of(ros_type, definition(ros_type)).table(messages)
+            table = layout_of(ros_type, definition_in(ros_type, schema)).table(messages)
         except MessageError:
             half = len(messages) // 2
             if not half:
                 self.broken[channel.topic] += 1
                 return
-            self.add(channel, logged_ns[:half], messages[:half])
-            self.add(channel, logged_ns[half:], messages[half:])
+            self.add(channel, schema, logged_ns[:half], messages[:half])
+            self.add(channel, schema, logged_ns[half:], messages[half:])
             return
         stamps = table.columns["header.stamp"].values[:, 0]
         times = np.where(stamps == 0, np.array(logged_ns, dtype=np.int64), stamps)

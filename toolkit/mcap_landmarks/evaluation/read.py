@@ -91,21 +91,25 @@ def _collect(path: Path, channels: tuple[Channel[Message], ...], progress: Progr
     found = Collected(str(path))
     with open_recording(path) as recording:
         connections = _connections(recording, channels)
-        held: dict[Channel[Message], tuple[list[int], list[bytes]]] = {}
+        held: dict[tuple[Channel[Message], bytes], tuple[list[int], list[bytes]]] = {}
         for raw in recording.messages(connections, progress=progress):
             channel = connections[raw.connection]
             if channel.topic in found.once:
                 continue
-            logged_ns, messages = held.setdefault(channel, ([], []))
+            logged_ns, messages = held.setdefault((channel, raw.connection.schema), ([], []))
             logged_ns.append(raw.log_time_ns)
             messages.append(bytes(raw.data))
             if len(messages) == _AT_ONCE or channel in ONCE:
-                found.add(channel, *held.pop(channel))
-        for channel, rest in held.items():
-            found.add(channel, *rest)
+                found.add(channel, _text(raw.connection.schema), *held.pop((channel, raw.connection.schema)))
+        for (channel, schema), rest in held.items():
+            found.add(channel, _text(schema), *rest)
         broken = (f"{topic}: {count} messages could not be decoded" for topic, count in found.broken.items())
         found.losses.extend([*broken, *recording.losses])
     return found
+
+
+def _text(schema: bytes) -> str:
+    return schema.decode(errors="replace")
 
 
 def _connections(recording: Recording, channels: tuple[Channel[Message], ...]) -> dict[Connection, Channel[Message]]:

@@ -1,7 +1,7 @@
 """Objects of many bundles that are each taken for a landmark, as arrays for the solvers, and what they tell of them."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.estimation.polar import polar_from_points
 from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.localization.class_association import pairs_by_class
 from mcap_landmarks.localization.config import LocalizeConfig
+from mcap_landmarks.localization.decision import Decision, Rule, of_classes, of_one_kind
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.maps.scene_objects import known_covariances
 from mcap_landmarks.messages.scene import SceneObjects
@@ -23,11 +25,22 @@ _NO_BEARING_RAD = 1.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Problem:
-    """Objects (K,) of one scene and the landmarks (K,) they are taken for."""
+    """Objects (K,) of one scene and the landmarks (K,) they are taken for; `decision` is what was asked by now."""
 
     scene: SceneObjects
     objects: Rows
     landmarks: Rows
+    decision: Decision
+
+    @classmethod
+    def of(cls, scene: SceneObjects, landmark_of: Mapping[str, int]) -> Self:
+        """The objects whose class stands for one landmark."""
+        objects, landmarks = pairs_by_class(scene.classes, landmark_of)
+        return cls(scene, objects, landmarks, of_classes(scene.classes, len(objects)))
+
+    def of_one_kind(self, rule: Rule) -> "Problem":
+        """The same, known to have `RANGES` or `BEARINGS` alone."""
+        return replace(self, decision=of_one_kind(self.decision, rule, len(self.objects)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,128 +1,182 @@
-"""What is said of one bundle after matching: accepted with a pose, or refused with the candidates."""
+"""Whether a pose is accepted, for every way to localize: the conditions, and the status that follows from them.
 
+Nothing else decides. Each condition that was looked at is written into the log, so that it can be read there why a
+bundle was localized or not.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.special import logsumexp
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import chdtri
 
 from mcap_landmarks.estimation.pose import position_sigma
-from mcap_landmarks.geometry import se2
 from mcap_landmarks.localization.config import LocalizeConfig
-from mcap_landmarks.localization.index import MapIndex
-from mcap_landmarks.localization.verification import UNMATCHED, Fits
-from mcap_landmarks.messages.match import LandmarkMatch, Status
-from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.match import Condition, Status
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
-_LISTED = 5
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Match:
-    """What came of one bundle, and where it was localized its pose map_from_base (3,) and covariance (3, 3)."""
-
-    message: LandmarkMatch
-    pose: Array | None = None
-    covariance: Array | None = None
+LEAST_OF_ONE_KIND = 3
+"""Objects that a position from ranges or bearings alone needs: two leave a mirror image, or a circle."""
+_TRIPLE = 3  # objects of a group in the thesis
+_MATCHED_SHARE = 0.5  # a bundle of which most does not fit was seen elsewhere, or the map has changed
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Places:
-    """Distinct places where a set of objects may have been seen, best first, and how likely the best is an accident."""
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What is asked of a bundle: the status of those that fail it, and what its value is, in words."""
 
-    fits: Fits
-    expected_accidental: float
+    name: str
+    failing: Status
+    words: str
+    at_most: bool = False
 
-    def scores(self) -> Array:
-        """Share of each place in the evidence, that for an unknown place included."""
-        log_ratio = self.fits.log_ratio
-        shares: Array = np.exp(log_ratio - logsumexp(np.append(log_ratio, 0.0)))
-        return shares
+    def asked(self, value: float, limit: float) -> Condition:
+        """The condition on one bundle: a value that is no number fails."""
+        held = value <= limit if self.at_most else value >= limit
+        return Condition(self.name, float(value), float(limit), bool(held))
+
+    def told(self, condition: Condition) -> str:
+        """The condition in words."""
+        bound = f"at most {condition.limit:.4g} allowed" if self.at_most else f"at least {condition.limit:.4g} needed"
+        return f"{condition.value:.3g} {self.words}, {bound}"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Fix:
-    """A pose map_from_base (3,) that was accepted, its covariance (3, 3) in the base frame, and how well it fits.
+OBJECTS = Rule("objects", Status.TOO_FEW_OBJECTS, "objects in the bundle")
+CLASSES = Rule("distinct_classes", Status.TOO_FEW_OBJECTS, "different classes in the bundle")
+RANGES = Rule("ranges", Status.TOO_FEW_OBJECTS, "ranges to landmarks, without bearings")
+BEARINGS = Rule("bearings", Status.TOO_FEW_OBJECTS, "bearings to landmarks, without ranges")
+SURPLUS = Rule("surplus_objects", Status.NO_MATCH, "objects beside the three of a group", at_most=True)
+GROUPS = Rule("groups", Status.NO_MATCH, "groups of the map have these classes in this order")
+PLACES = Rule("places", Status.NO_MATCH, "places of the map where objects fit")
+EVIDENCE = Rule("log_evidence", Status.NO_MATCH, "log odds of all places against objects that the map does not know")
+ACCIDENTAL = Rule("expected_accidental", Status.AMBIGUOUS, "matches as good expected by accident", at_most=True)
+MATCHED = Rule("matched_objects", Status.NO_MATCH, "objects matched to landmarks")
+SHARE = Rule("matched_share", Status.INCONSISTENT, "of the objects whose class the map knows are matched")
+CHI2 = Rule("chi2", Status.INCONSISTENT, "sum of squared normalised residuals", at_most=True)
+CONVERGED = Rule("converged", Status.WEAK_GEOMETRY, "(1 where the solver converged)")
+POSITION = Rule("position_sigma_m", Status.WEAK_GEOMETRY, "m largest standard deviation of the position", at_most=True)
+HEADING = Rule("heading_sigma_deg", Status.WEAK_GEOMETRY, "degrees standard deviation of the heading", at_most=True)
+MIRROR = Rule("mirror_odds", Status.AMBIGUOUS, "odds of the mirror image against the position", at_most=True)
 
-    `landmarks` (K,) has the landmark that each object of the bundle shows, or `UNMATCHED`.
+RULES = {
+    rule.name: rule
+    for rule in (
+        OBJECTS,
+        CLASSES,
+        RANGES,
+        BEARINGS,
+        SURPLUS,
+        GROUPS,
+        PLACES,
+        EVIDENCE,
+        ACCIDENTAL,
+        MATCHED,
+        SHARE,
+        CHI2,
+        CONVERGED,
+        POSITION,
+        HEADING,
+        MIRROR,
+    )
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """The conditions of one bundle; of those that do not hold the first one tells the status."""
+
+    conditions: tuple[Condition, ...]
+
+    @property
+    def status(self) -> Status:
+        """Localized if and only if all conditions hold."""
+        return next((RULES[one.name].failing for one in self.conditions if not one.held), Status.LOCALIZED)
+
+    @property
+    def holds(self) -> bool:
+        """Whether all conditions do, of those that were looked at by now."""
+        return self.status == Status.LOCALIZED
+
+
+def told(condition: Condition) -> str:
+    """A condition in words; those that another version of this program asks have none here."""
+    rule = RULES.get(condition.name)
+    return rule.told(condition) if rule else f"{condition.value:.3g}, with a limit of {condition.limit:.4g}"
+
+
+def is_accident(expected_accidental: float, config: LocalizeConfig) -> bool:
+    """Whether a place may be one of those that fit by accident."""
+    return not ACCIDENTAL.asked(expected_accidental, config.accidental).held
+
+
+def of_unknown_place(objects: int) -> Decision:
+    """Where classes repeat: no place was found at which anything fits."""
+    return Decision((OBJECTS.asked(objects, 2), PLACES.asked(0, 1)))
+
+
+def of_places(
+    objects: int, places: int, log_evidence: float, expected_accidental: float, config: LocalizeConfig
+) -> Decision:
+    """Where classes repeat: places were found, none of which can be told from an accident."""
+    asked = OBJECTS.asked(objects, 2), PLACES.asked(places, 1), EVIDENCE.asked(log_evidence, 0.0)
+    return Decision((*asked, ACCIDENTAL.asked(expected_accidental, config.accidental)))
+
+
+def of_place(
+    objects: int, known: int, matched: int, expected_accidental: float, covariance: Array, config: LocalizeConfig
+) -> Decision:
+    """Where classes repeat: a place was found, or followed, at which so many objects are matched.
+
+    `known` are the objects whose class the map has, `covariance` (3, 3) is that of the pose.
     """
-
-    pose: Array
-    covariance: Array
-    landmarks: Ints
-    expected_accidental: float
-    chi2: float
-    dof: int
+    asked = [OBJECTS.asked(objects, 2), ACCIDENTAL.asked(expected_accidental, config.accidental)]
+    asked.append(MATCHED.asked(matched, 1))
+    if known:
+        asked.append(SHARE.asked(matched / known, _MATCHED_SHARE))
+    return Decision((*asked, *_of_geometry(covariance, config)))
 
 
-def refused(scene: SceneObjects, index: MapIndex, places: Places | None, joined: int = 1) -> Match:
-    """A bundle of which it is not clear where it was seen."""
-    status = Status.AMBIGUOUS
-    if len(scene) < 2:
-        status = Status.TOO_FEW_OBJECTS
-    elif places is None or logsumexp(places.fits.log_ratio) < 0:
-        status = Status.NO_MATCH
-    shown = np.zeros((0, 0), dtype=np.int64) if places is None else places.fits.candidates.landmarks[:_LISTED]
-    message = LandmarkMatch(
-        scene.stamp_ns,
-        scene.frame_id,
-        status,
-        candidate_ids=tuple(place_name(index, landmarks) for landmarks in shown),
-        candidate_scores=np.zeros(0) if places is None else places.scores()[:_LISTED],
-        expected_accidental=float(len(index)) if places is None else places.expected_accidental,
-        bundles_joined=joined,
-    )
-    return Match(message)
+def of_classes(classes: Sequence[str], matched: int) -> Decision:
+    """Where every class stands for one landmark: what a bundle must have before a pose is looked for."""
+    return Decision((CLASSES.asked(len(set(classes)), 2), MATCHED.asked(matched, 2)))
 
 
-def accepted(
-    scene: SceneObjects,
-    rows: Ints,
-    points_xy: Array,
-    index: MapIndex,
-    fix: Fix,
-    config: LocalizeConfig,
-    joined: int = 1,
-) -> Match:
-    """A bundle that was seen from a known pose, unless a limit says no; `rows` (K,) are its objects in the scene."""
-    turn = np.eye(3)
-    turn[:2, :2] = se2.rotation(fix.pose[2])
-    covariance = turn @ fix.covariance @ turn.T
-    matched = np.flatnonzero(fix.landmarks != UNMATCHED)
-    landmarks = fix.landmarks[matched]
-    status = Status.LOCALIZED
-    if len(scene) < 2:
-        status = Status.TOO_FEW_OBJECTS
-    elif fix.expected_accidental > config.accidental:
-        status = Status.AMBIGUOUS
-    elif not len(matched):
-        status = Status.NO_MATCH
-    elif 2 * len(matched) < len(rows):
-        status = Status.INCONSISTENT
-    elif position_sigma(covariance) > config.max_sigma_m:
-        status = Status.WEAK_GEOMETRY
-    miss = se2.transform_points(fix.pose, points_xy[matched]) - index.positions_xy[landmarks]
-    message = LandmarkMatch(
-        scene.stamp_ns,
-        scene.frame_id,
-        status,
-        tuple(scene.ids[i] for i in rows[matched]),
-        tuple(index.landmark_map.ids[index.rows[i]] for i in landmarks),
-        np.linalg.norm(miss, axis=1),
-        (place_name(index, fix.landmarks),),
-        np.array([1 / (1 + fix.expected_accidental)]),
-        fix.expected_accidental,
-        fix.chi2,
-        fix.dof,
-        joined,
-    )
-    return Match(message, fix.pose, covariance) if status == Status.LOCALIZED else Match(message)
+def of_one_kind(before: Decision, rule: Rule, count: int) -> Decision:
+    """The same of a bundle of `RANGES` or `BEARINGS` alone."""
+    return Decision((*before.conditions, rule.asked(count, LEAST_OF_ONE_KIND)))
 
 
-def place_name(index: MapIndex, landmarks: Ints) -> str:
-    """The ids of a place's landmarks, the first few, joined by plus signs."""
-    shown = landmarks[landmarks != UNMATCHED][:_LISTED]
-    return "+".join(index.landmark_map.ids[index.rows[i]] for i in shown)
+def of_pose(
+    before: Decision, chi2: float, chi2_limit: float, covariance: Array, config: LocalizeConfig, *, converged: bool
+) -> Decision:
+    """Where every class stands for one landmark: the pose that was found, with covariance (3, 3)."""
+    asked = CHI2.asked(chi2, chi2_limit), CONVERGED.asked(converged, 1)
+    return Decision((*before.conditions, *asked, *_of_geometry(covariance, config)))
+
+
+def of_position(
+    before: Decision, chi2: float, chi2_limit: float, sigma_m: float, mirror_odds: float, config: LocalizeConfig
+) -> Decision:
+    """Of ranges alone: the position that was found, and how likely its mirror image is beside it."""
+    asked = CHI2.asked(chi2, chi2_limit), POSITION.asked(sigma_m, config.max_sigma_m)
+    return Decision((*before.conditions, *asked, MIRROR.asked(mirror_odds, config.accidental)))
+
+
+def of_triple(objects: int, groups: int | None = None) -> Decision:
+    """As in the thesis: exactly three objects, of the classes of a group; `groups` is None where that was not asked."""
+    asked = OBJECTS.asked(objects, _TRIPLE), SURPLUS.asked(objects - _TRIPLE, 0)
+    return Decision(asked if groups is None else (*asked, GROUPS.asked(groups, 1)))
+
+
+def chi2_limits(dof: ArrayLike, config: LocalizeConfig) -> Array:
+    """The largest chi-square (...) of degrees (...) that fits: `consistency` of all sets of objects lie beyond it."""
+    return np.asarray(chdtri(np.maximum(dof, 1), config.consistency), dtype=np.float64)
+
+
+def _of_geometry(covariance: Array, config: LocalizeConfig) -> tuple[Condition, Condition]:
+    finite = bool(np.isfinite(covariance).all())
+    sigma_m = float(position_sigma(covariance)) if finite else np.inf
+    sigma_deg = float(np.degrees(np.sqrt(covariance[2, 2]))) if finite else np.inf
+    return POSITION.asked(sigma_m, config.max_sigma_m), HEADING.asked(sigma_deg, config.max_sigma_deg)

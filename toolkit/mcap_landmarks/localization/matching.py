@@ -12,8 +12,9 @@ from scipy.special import chdtri, logsumexp
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.localization.acceptance import ClassEvidence, PairDensity
 from mcap_landmarks.localization.config import LocalizeConfig
-from mcap_landmarks.localization.decision import Fix, Match, Places, accepted, refused
+from mcap_landmarks.localization.decision import is_accident
 from mcap_landmarks.localization.index import MapIndex
+from mcap_landmarks.localization.match import Fix, Match, Places, at_place, without_place
 from mcap_landmarks.localization.pose_candidates import Finder
 from mcap_landmarks.localization.validation import check_lengths
 from mcap_landmarks.localization.verification import Candidates, Constellations, Fits, Verifier
@@ -128,7 +129,7 @@ class Matcher:
                 part = members[first : first + step]
                 for i, places in zip(part, self._places_of([read[i] for i in part]), strict=True):
                     found[i] = places
-        return [self._judge(*one) for one in zip(scenes, read, found, strict=True)]
+        return [self._match_at(*one) for one in zip(scenes, read, found, strict=True)]
 
     def _places_of(self, read: Sequence[Objects]) -> list[Places | None]:
         """Where each of several bundles of as many objects may have been seen."""
@@ -140,10 +141,10 @@ class Matcher:
         )
         return self.places(sets, self.candidates(sets, np.ones(sets.points_xy.shape[:2], dtype=np.bool_)))
 
-    def _judge(self, scene: SceneObjects, objects: Objects, places: Places | None) -> Match:
-        if places is None or places.expected_accidental > self.config.accidental:
-            return refused(scene, self.index, places)
-        return accepted(scene, objects.rows, objects.points_xy, self.index, best_of(places), self.config)
+    def _match_at(self, scene: SceneObjects, objects: Objects, places: Places | None) -> Match:
+        if places is None or is_accident(places.expected_accidental, self.config):
+            return without_place(scene, self.index, places, self.config)
+        return at_place(scene, objects.rows, objects.points_xy, self.index, best_of(places), self.config)
 
 
 def best_of(places: Places) -> Fix:

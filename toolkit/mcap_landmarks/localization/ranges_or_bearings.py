@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import chdtri
 
 from mcap_landmarks.estimation.batch import PoseSolutions
 from mcap_landmarks.estimation.bearings import solve_bearings
@@ -12,12 +11,11 @@ from mcap_landmarks.estimation.ranges import PositionSolutions, solve_ranges
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.correspondences import Bools, Given, Problem
-from mcap_landmarks.localization.decision import Match
+from mcap_landmarks.localization.decision import chi2_limits, of_position
+from mcap_landmarks.localization.match import Match
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.messages.match import LandmarkMatch, Status
 
-LEAST = 3
-"""Objects that a position from ranges or bearings alone needs."""
 # Mirror images so close are one position.
 _SAME_SIGMAS = 3.0
 
@@ -49,30 +47,27 @@ def _judge(
     sigma_m = position_sigma(covariance)
     odds = np.exp(-(chi2_of - chi2_of[0]) / 2)
     apart = np.linalg.norm(both[1] - position) > _SAME_SIGMAS * sigma_m
-    status = Status.LOCALIZED
-    if chi2_of[0] > chdtri(max(dof, 1), config.consistency):
-        status = Status.INCONSISTENT
-    elif sigma_m > config.max_sigma_m:
-        status = Status.WEAK_GEOMETRY
-    elif apart and odds[1] > config.accidental:
-        status = Status.AMBIGUOUS
+    mirror_odds = float(odds[1]) if apart else 0.0
+    limit = float(chi2_limits(dof, config))
+    made = of_position(problem.decision, float(chi2_of[0]), limit, float(sigma_m), mirror_odds, config)
     k = len(problem.objects)
     off_m = np.abs(distances(position[None], given.pick(np.array([i])))[0, :k] - given.range_m[i, :k])
-    shown = both if status == Status.AMBIGUOUS else both[:0]
+    shown = both if made.status == Status.AMBIGUOUS else both[:0]
     match = LandmarkMatch(
         problem.scene.stamp_ns,
         problem.scene.frame_id,
-        status,
+        made.status,
         tuple(problem.scene.ids[row] for row in problem.objects),
         tuple(landmark_map.ids[row] for row in problem.landmarks),
         off_m,
         tuple(f"x {x:.3f} m, y {y:.3f} m" for x, y in shown.tolist()),
         (odds / odds.sum())[: len(shown)],
-        float(odds[1]) if apart else 0.0,
+        mirror_odds,
         float(chi2_of[0]),
         dof,
+        conditions=made.conditions,
     )
-    return Match(match, np.array([*position, 0.0])) if status == Status.LOCALIZED else Match(match)
+    return Match.of(match, np.array([*position, 0.0]))
 
 
 def distances(poses: Array, given: Given) -> Array:

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.geometry import se2
-from mcap_landmarks.localization.decision import Places
 from mcap_landmarks.localization.local_map import Surroundings
+from mcap_landmarks.localization.match import Places
 from mcap_landmarks.localization.matching import Matcher, is_same_place
 from mcap_landmarks.localization.verification import UNMATCHED, Candidates, Constellations
 

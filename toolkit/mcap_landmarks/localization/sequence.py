@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, motion_covariance
 from mcap_landmarks.geometry import se2
-from mcap_landmarks.localization.decision import Fix, Match, accepted, refused
+from mcap_landmarks.localization.decision import is_accident
 from mcap_landmarks.localization.local_map import Surroundings
+from mcap_landmarks.localization.match import Fix, Match, at_place, without_place
 from mcap_landmarks.localization.matching import Matcher, Objects, best_of
 from mcap_landmarks.localization.relocalization import Searcher
 from mcap_landmarks.localization.tracker import Follower
@@ -63,8 +64,9 @@ class Joiner:
                 return self._report(scene, objects, fix, joined)
             self._follower, fresh = None, np.ones_like(fresh)
         found = self._searcher.search(self._around, fresh)
-        if found is None or found[0].expected_accidental > self._matcher.config.accidental:
-            return refused(scene, self._matcher.index, found[0] if found else None, joined)
+        config = self._matcher.config
+        if found is None or is_accident(found[0].expected_accidental, config):
+            return without_place(scene, self._matcher.index, found[0] if found else None, config, joined)
         fix, rows = best_of(found[0]), found[1]
         self._follower = Follower(self._matcher, fix, self._around.points_xy[rows], self._length_m)
         landmark_of = dict(zip(self._around.numbers[rows].tolist(), fix.landmarks.tolist(), strict=True))
@@ -93,4 +95,4 @@ class Joiner:
         return max(len(self._joined), 1)
 
     def _report(self, scene: SceneObjects, objects: Objects, fix: Fix, joined: int) -> Match:
-        return accepted(scene, objects.rows, objects.points_xy, self._matcher.index, fix, self._matcher.config, joined)
+        return at_place(scene, objects.rows, objects.points_xy, self._matcher.index, fix, self._matcher.config, joined)

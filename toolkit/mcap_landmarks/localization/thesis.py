@@ -6,9 +6,10 @@ import numpy as np
 
 from mcap_landmarks.estimation.thesis import solve_position
 from mcap_landmarks.localization.config import LocalizeConfig
-from mcap_landmarks.localization.decision import Match
+from mcap_landmarks.localization.decision import of_triple
+from mcap_landmarks.localization.match import Match
 from mcap_landmarks.maps.model import Group, LandmarkMap
-from mcap_landmarks.messages.match import LandmarkMatch, Status
+from mcap_landmarks.messages.match import LandmarkMatch
 from mcap_landmarks.messages.scene import SceneObjects
 
 
@@ -29,22 +30,24 @@ def _locate(
     config: LocalizeConfig,
 ) -> Match:
     if len(scene) != 3:
-        status = Status.TOO_FEW_OBJECTS if len(scene) < 3 else Status.NO_MATCH
-        return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, status))
+        made = of_triple(len(scene))
+        return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, made.status, conditions=made.conditions))
     bearings = np.arctan2(scene.positions_xy[:, 1], scene.positions_xy[:, 0])
     order = np.argsort(-bearings, kind="stable")
     group = groups.get(tuple(scene.classes[i] for i in order))
+    made = of_triple(len(scene), 0 if group is None else 1)
     if group is None:
-        return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, Status.NO_MATCH))
+        return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, made.status, conditions=made.conditions))
     landmarks = np.stack([position_of[name] for name in group.landmark_ids])
     range_m = np.linalg.norm(scene.positions_xy[order], axis=1)
     position = solve_position(landmarks, range_m, config.thesis_guess_m)
     match = LandmarkMatch(
         scene.stamp_ns,
         scene.frame_id,
-        Status.LOCALIZED,
+        made.status,
         tuple(scene.ids[i] for i in order),
         group.landmark_ids,
         np.abs(np.linalg.norm(landmarks - position, axis=1) - range_m),
+        conditions=made.conditions,
     )
-    return Match(match, np.array([*position, 0.0]))
+    return Match.of(match, np.array([*position, 0.0]))

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.geometry import se2
-from mcap_landmarks.localization.decision import Fix
 from mcap_landmarks.localization.evidence import Memory
+from mcap_landmarks.localization.match import Fix
 from mcap_landmarks.localization.matching import Matcher, Objects, block_diagonal
 from mcap_landmarks.localization.verification import UNMATCHED, Candidates, Constellations, Prior
 

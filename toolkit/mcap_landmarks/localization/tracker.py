@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from mcap_landmarks.geometry import se2
-from mcap_landmarks.localization.decision import Fix
 from mcap_landmarks.localization.evidence import Memory
+from mcap_landmarks.localization.match import Fix
 from mcap_landmarks.localization.matching import Matcher, Objects, is_same_place
 from mcap_landmarks.localization.track_hypothesis import Hypothesis
 from mcap_landmarks.localization.verification import UNMATCHED

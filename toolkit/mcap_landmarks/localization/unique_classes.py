@@ -4,20 +4,20 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from mcap_landmarks.estimation.batch import PoseSolutions
 from mcap_landmarks.estimation.calibration import SensorModel, calibrate
-from mcap_landmarks.estimation.pose import position_sigma, solve_poses
+from mcap_landmarks.estimation.pose import solve_poses
 from mcap_landmarks.geometry.se2 import Array, transform_points
-from mcap_landmarks.localization.class_association import pairs_by_class, unique_classes
+from mcap_landmarks.localization.class_association import unique_classes
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.correspondences import Bools, Given, Problem, Rows
-from mcap_landmarks.localization.decision import Match
-from mcap_landmarks.localization.ranges_or_bearings import LEAST, by_bearings, distances, locate_by_ranges
+from mcap_landmarks.localization.decision import BEARINGS, LEAST_OF_ONE_KIND, RANGES, chi2_limits, of_pose
+from mcap_landmarks.localization.match import Match
+from mcap_landmarks.localization.ranges_or_bearings import by_bearings, distances, locate_by_ranges
 from mcap_landmarks.localization.validation import check_scale
 from mcap_landmarks.maps.model import LandmarkMap
-from mcap_landmarks.messages.match import LandmarkMatch, Status
+from mcap_landmarks.messages.match import LandmarkMatch
 from mcap_landmarks.messages.scene import SceneObjects
 
 
@@ -32,38 +32,37 @@ class UniqueLocator:
 
     def locate(self, scenes: Sequence[SceneObjects]) -> list[Match]:
         """Pose of each scene's base in the map, from the landmarks whose class is unique."""
-        problems = [Problem(scene, *pairs_by_class(scene.classes, self._landmark_of)) for scene in scenes]
-        located = [_too_few(problem) for problem in problems]
-        rows = [i for i, result in enumerate(located) if result is None]
-        if rows:
-            for i, result in zip(rows, self._located([problems[i] for i in rows]), strict=True):
-                located[i] = result
-        return [result for result in located if result is not None]
+        problems = [Problem.of(scene, self._landmark_of) for scene in scenes]
+        ready = [problem for problem in problems if problem.decision.holds]
+        located = iter(self._located(ready) if ready else [])
+        return [next(located) if problem.decision.holds else _refused(problem) for problem in problems]
 
     def _located(self, problems: Sequence[Problem]) -> list[Match]:
         """Locate all, those of ranges or bearings alone as such."""
         given = Given.of(problems, self._map, self._config)
         ranges, bearings = given.ranges_alone(), given.bearings_alone()
-        many = given.mask.sum(axis=1) >= LEAST
-        few = np.flatnonzero((ranges | bearings) & ~many).tolist()
-        found = {i: _none(problems[i]) for i in few}
+        asked = list(problems)
+        for i in np.flatnonzero(ranges | bearings).tolist():
+            asked[i] = problems[i].of_one_kind(RANGES if ranges[i] else BEARINGS)
+        many = np.array([problem.decision.holds for problem in asked])
+        found = {i: _refused(asked[i]) for i in np.flatnonzero(~many).tolist()}
 
         def put(chosen: Bools, solve: Callable[[Sequence[Problem], Given], list[Match]]) -> None:
             rows = np.flatnonzero(chosen)
             if len(rows):
                 which = rows.tolist()
-                found.update(zip(which, solve([problems[i] for i in which], given.pick(rows)), strict=True))
+                found.update(zip(which, solve([asked[i] for i in which], given.pick(rows)), strict=True))
 
-        put(~ranges & ~bearings, self._solve)
+        put(many & ~ranges & ~bearings, self._solve)
         put(bearings & many, self._by_bearings)
         put(ranges & many, lambda chosen, part: locate_by_ranges(chosen, part, self._map, self._config))
         return [found[i] for i in range(len(problems))]
 
     def _by_bearings(self, problems: Sequence[Problem], given: Given) -> list[Match]:
-        solved, mask, fits = _fitting(lambda mask: by_bearings(given, mask), given.mask, LEAST, self._config)
+        solved, mask = _fitting(lambda mask: by_bearings(given, mask), given.mask, LEAST_OF_ONE_KIND, self._config)
         distance_m = distances(solved.map_from_base, given)
         return [
-            _judge(problem, i, solved, mask[i], distance_m[i], bool(fits[i]), self._map, self._config)
+            _match(problem, i, solved, mask[i], distance_m[i], self._map, self._config)
             for i, problem in enumerate(problems)
         ]
 
@@ -103,72 +102,60 @@ class UniqueLocator:
                 robust_dof=config.robust_dof or None,
             )
 
-        solutions, mask, fits = _fitting(solve, given.mask, 2, config)
+        solutions, mask = _fitting(solve, given.mask, 2, config)
         return [
-            _judge(problem, i, solutions, mask[i], distance_m[i], bool(fits[i]), self._map, config)
+            _match(problem, i, solutions, mask[i], distance_m[i], self._map, config)
             for i, problem in enumerate(problems)
         ]
 
 
 def _fitting(
     solve: Callable[[Bools], PoseSolutions], mask: Bools, least: int, config: LocalizeConfig
-) -> tuple[PoseSolutions, Bools, Bools]:
-    """Solutions without the worst of what does not fit, of which `least` stay; what (B, K) stays; who (B,) fits."""
+) -> tuple[PoseSolutions, Bools]:
+    """Solutions without the worst of what does not fit, of which `least` stay; and what (B, K) stays."""
     mask = mask.copy()
     while True:
         solutions = solve(mask)
-        fits = solutions.chi2 <= chdtri(np.maximum(solutions.dof, 1), config.consistency)
+        fits = solutions.chi2 <= chi2_limits(solutions.dof, config)
         worse: Rows = np.flatnonzero(~fits & (mask.sum(axis=1) > least))
         if not len(worse):
-            return solutions, mask, fits
+            return solutions, mask
         mask[worse, np.argmax(np.where(mask, solutions.observation_chi2, -1.0)[worse], axis=1)] = False
 
 
-def _none(problem: Problem) -> Match:
-    return Match(LandmarkMatch(problem.scene.stamp_ns, problem.scene.frame_id, Status.TOO_FEW_OBJECTS))
+def _refused(problem: Problem) -> Match:
+    """The match of a bundle for which no pose was looked for."""
+    scene, made = problem.scene, problem.decision
+    return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, made.status, conditions=made.conditions))
 
 
-def _too_few(problem: Problem) -> Match | None:
-    scene = problem.scene
-    if len(set(scene.classes)) < 2:
-        return _none(problem)
-    if len(problem.objects) < 2:
-        return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, Status.NO_MATCH))
-    return None
-
-
-def _judge(
+def _match(
     problem: Problem,
     i: int,
     solutions: PoseSolutions,
     used: NDArray[np.bool_],
     distance_m: Array,
-    fits: bool,
     landmark_map: LandmarkMap,
     config: LocalizeConfig,
 ) -> Match:
     scene, kept = problem.scene, np.flatnonzero(used)
     objects, landmarks = problem.objects[kept], problem.landmarks[kept]
     pose, covariance = solutions.map_from_base[i], solutions.covariance[i]
-    finite = np.isfinite(covariance).all()
-    sigma_m = float(position_sigma(covariance)) if finite else np.inf
-    sigma_deg = float(np.degrees(np.sqrt(covariance[2, 2]))) if finite else np.inf
-    status = Status.LOCALIZED
-    if not fits:
-        status = Status.INCONSISTENT
-    elif not solutions.converged[i] or sigma_m > config.max_sigma_m or sigma_deg > config.max_sigma_deg:
-        status = Status.WEAK_GEOMETRY
+    chi2, dof = float(solutions.chi2[i]), int(solutions.dof[i])
+    limit, converged = float(chi2_limits(dof, config)), bool(solutions.converged[i])
+    made = of_pose(problem.decision, chi2, limit, covariance, config, converged=converged)
     points = scene.positions_xy[objects]
     points = points * (distance_m[kept] / np.maximum(np.hypot(points[:, 0], points[:, 1]), 1e-9))[:, None]
     miss = transform_points(pose, points) - landmark_map.positions_xy[landmarks]
-    match = LandmarkMatch(
+    message = LandmarkMatch(
         scene.stamp_ns,
         scene.frame_id,
-        status,
+        made.status,
         tuple(scene.ids[row] for row in objects),
         tuple(landmark_map.ids[row] for row in landmarks),
         np.linalg.norm(miss, axis=1),
-        chi2=float(solutions.chi2[i]),
-        dof=int(solutions.dof[i]),
+        chi2=chi2,
+        dof=dof,
+        conditions=made.conditions,
     )
-    return Match(match, pose, covariance) if status == Status.LOCALIZED else Match(match)
+    return Match.of(message, pose, covariance)

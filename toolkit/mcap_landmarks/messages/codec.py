@@ -6,7 +6,7 @@ from typing import ClassVar, Protocol, Self, TypeVar
 from rosbags.serde import SerdeError
 
 from mcap_landmarks.errors import MessageError
-from mcap_landmarks.messages.typestore import RosObject, typestore
+from mcap_landmarks.messages.typestore import RosObject, typestore, typestore_in
 
 
 class Message(Protocol):
@@ -30,14 +30,18 @@ def encode(message: Message) -> bytes:
     return bytes(typestore().serialize_cdr(message.to_ros(), message.ROS_TYPE))
 
 
-def decode(message_type: type[M], data: bytes | memoryview) -> M:
+def decode(message_type: type[M], data: bytes | memoryview, schema: str = "") -> M:
     """Message of the given dataclass from CDR bytes.
+
+    `schema` is the text of the type's definition in the log: one of ours that was written by an earlier version has
+    less fields, and the others keep their defaults.
 
     Raises:
         MessageError: the bytes do not fit the type.
     """
     try:
-        return message_type.from_ros(typestore().deserialize_cdr(data, message_type.ROS_TYPE))
+        store = typestore_in(message_type.ROS_TYPE, schema) if schema else typestore()
+        return message_type.from_ros(store.deserialize_cdr(data, message_type.ROS_TYPE))
     except (SerdeError, struct_error, IndexError, ValueError, UnicodeDecodeError) as error:
         raise MessageError(
             f"{len(data)} bytes are not a {message_type.ROS_TYPE}: {error or type(error).__name__}"

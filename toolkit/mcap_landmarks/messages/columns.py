@@ -71,6 +71,7 @@ class Numbers:
     def take(self, rows: int, table: Table) -> None:
         """Add what was read to a table of so many rows."""
         values = np.frombuffer(b"".join(self.slices), self.dtype)
+        values = values.view(np.uint8) if self.dtype == np.bool_ else values  # truths are compared like numbers
         if self.count is None:
             counts = np.array(self.counts, dtype=np.int64)
             ((path, kind, _, _),) = self.fields

@@ -13,10 +13,11 @@ from mcap_landmarks.errors import MessageError
 from mcap_landmarks.messages.columns import Children, Kind, Moments, Numbers, Rows, Table, Text, Texts
 
 _SCALARS = {
-    "bool": "<u1", "byte": "<u1", "char": "<u1", "octet": "<u1", "int8": "<i1", "uint8": "<u1", "int16": "<i2",
+    "bool": "?", "byte": "<u1", "char": "<u1", "octet": "<u1", "int8": "<i1", "uint8": "<u1", "int16": "<i2",
     "uint16": "<u2", "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8", "float32": "<f4",
     "float64": "<f8",
 }  # fmt: skip
+_BYTES = (np.dtype("<u1"), np.dtype("<i1"))
 _MOMENTS = frozenset({"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"})
 _LITTLE_ENDIAN = b"\x00\x01"
 FieldType = Any  # of rosbags: (kind, content), nested
@@ -44,7 +45,14 @@ class Layout:
             reason = error or type(error).__name__
             raise MessageError(f"{ros_type}: its schema cannot be understood ({reason})") from error
         self.stamped = isinstance(next(iter(parts), None), Moments)
-        self.has_payload = any(isinstance(p, Numbers) and p.dtype.itemsize == 1 and p.count is None for p in parts)
+        self.has_payload = any(isinstance(p, Numbers) and p.dtype in _BYTES and p.count is None for p in parts)
+
+    def begins(self, other: "Layout") -> bool:
+        """Whether the other type has all fields of this one first, and perhaps more: as a message that has grown."""
+        own, others = self.definition[self._type], other.definition.get(self._type, ())
+        parts = {name: fields for name, fields in self.definition.items() if name != self._type}
+        same = all(other.definition.get(name) == fields for name, fields in parts.items())
+        return same and list(others[: len(own)]) == list(own)
 
     def table(self, messages: Sequence[bytes]) -> Table:
         """The columns of messages.

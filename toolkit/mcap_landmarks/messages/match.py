@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -21,12 +21,22 @@ class Status(IntEnum):
     WEAK_GEOMETRY = 5
 
 
+class Condition(NamedTuple):
+    """Something that was asked of a bundle: its name with the unit, what it came to, the limit, whether it held."""
+
+    name: str
+    value: float
+    limit: float
+    held: bool
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LandmarkMatch:
     """One bundle's match.
 
     object_ids, landmark_ids and residual_m (K,) belong together; candidates and their scores are what else was
-    possible; `expected_accidental` is the number of matches this good expected by chance.
+    possible; `expected_accidental` is the number of matches this good expected by chance. `conditions` are those that
+    were looked at: a bundle is localized if and only if all of them held. Logs of earlier versions tell none.
     """
 
     ROS_TYPE: ClassVar[str] = "mcap_landmarks_msgs/msg/LandmarkMatch"
@@ -43,6 +53,7 @@ class LandmarkMatch:
     chi2: float = 0.0
     dof: int = 0
     bundles_joined: int = 1
+    conditions: tuple[Condition, ...] = ()
 
     def to_ros(self) -> RosObject:
         """See `Message`."""
@@ -59,6 +70,10 @@ class LandmarkMatch:
             chi2=self.chi2,
             dof=self.dof,
             bundles_joined=self.bundles_joined,
+            condition_names=[one.name for one in self.conditions],
+            condition_values=np.array([one.value for one in self.conditions], dtype=np.float64),
+            condition_limits=np.array([one.limit for one in self.conditions], dtype=np.float64),
+            condition_held=np.array([one.held for one in self.conditions], dtype=np.bool_),
         )
 
     @classmethod
@@ -77,4 +92,13 @@ class LandmarkMatch:
             ros.chi2,
             ros.dof,
             ros.bundles_joined,
+            _conditions(ros),
         )
+
+
+def _conditions(ros: Any) -> tuple[Condition, ...]:
+    """The conditions of a match; a log that was written before there were any has no such fields."""
+    if not hasattr(ros, "condition_names"):
+        return ()
+    columns = (ros.condition_values.tolist(), ros.condition_limits.tolist(), map(bool, ros.condition_held))
+    return tuple(map(Condition, ros.condition_names, *columns))

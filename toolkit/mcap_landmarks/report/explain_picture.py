@@ -94,6 +94,9 @@ def _draw_place(axes: Axes, situation: Situation, place: Place, number: int, col
     if pose is None or situation.scene is None:
         return
     share = f", share {place.share:.2f}" if np.isfinite(place.share) else ""
+    if not np.isfinite(pose[2]):
+        axes.plot(*pose[:2], "*", color=colour, markersize=10, label=f"place {number}, heading unknown{share}")
+        return
     axes.quiver(
         *pose[:2], np.cos(pose[2]), np.sin(pose[2]), color=colour, width=0.006, scale=18, label=f"place {number}{share}"
     )

@@ -1,6 +1,7 @@
 """One bundle of a log with results and all that led to it, for an explanation."""
 
 import contextlib
+import dataclasses
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -22,11 +23,13 @@ from mcap_landmarks.channels import (
     SCENE_OBJECTS,
     TF_STATIC,
 )
+from mcap_landmarks.config import stage_config
 from mcap_landmarks.errors import MessageError, RecordingError, UsageError
-from mcap_landmarks.evaluation.explain import Limits, Situation
+from mcap_landmarks.evaluation.explain import Situation
 from mcap_landmarks.geometry.frames import FrameTree, apply, rigid
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.inspection.topic_roles import Choice, choose, message_type
+from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.manifest import RUN
 from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.scan import LaserScan
@@ -61,7 +64,7 @@ def read_situation(path: Path, at_ns: int) -> tuple[Situation, View]:
         for raw in recording.messages(channels, at_ns - _AROUND_NS, at_ns + _AROUND_NS):
             channel = channels[raw.connection]
             with contextlib.suppress(MessageError):
-                message: Any = decode(message_type(channel, raw.connection), raw.data)
+                message: Any = decode(message_type(channel, raw.connection), raw.data, _schema(raw.connection))
                 found[channel][message.stamp_ns or raw.log_time_ns] = message
         bundles = found[MATCH] or found[SCENE_OBJECTS]
         if not bundles:
@@ -75,7 +78,6 @@ def read_situation(path: Path, at_ns: int) -> tuple[Situation, View]:
 
 def _situation(recording: Recording, found: dict[Channel[Any], dict[int, Any]], stamp_ns: int) -> Situation:
     pose, spread = found[POSE].get(stamp_ns), found[POSE_COVARIANCE].get(stamp_ns)
-    config = json.loads(recording.metadata.get(RUN, {}).get("config", "{}"))
     return Situation(
         stamp_ns,
         found[SCENE_OBJECTS].get(stamp_ns),
@@ -85,8 +87,23 @@ def _situation(recording: Recording, found: dict[Channel[Any], dict[int, Any]], 
         None if spread is None else spread.planar_covariance,
         found[SCAN_OBJECTS].get(stamp_ns),
         _nearest(found[DETECTIONS], stamp_ns),
-        Limits.of(config.get("localize", {})),
+        _config(recording),
     )
+
+
+def _config(recording: Recording) -> LocalizeConfig:
+    """What localize ran with, as the log tells; the defaults for what it does not tell, or tells in other words."""
+    told = json.loads(recording.metadata.get(RUN, {}).get("config", "{}")).get("localize", {})
+    names = {field.name for field in dataclasses.fields(LocalizeConfig)}
+    with contextlib.suppress(UsageError):
+        made = stage_config(LocalizeConfig, "localize", {name: told[name] for name in names & set(told)})
+        assert isinstance(made, LocalizeConfig)  # noqa: S101 - that is what was asked for
+        return made
+    return LocalizeConfig()
+
+
+def _schema(connection: Connection) -> str:
+    return connection.schema.decode(errors="replace")
 
 
 def _view(recording: Recording, found: dict[Channel[Any], dict[int, Any]], stamp_ns: int) -> View:

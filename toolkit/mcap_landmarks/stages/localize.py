@@ -22,7 +22,7 @@ from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.geometry.se2 import compose, inverse
 from mcap_landmarks.localization.class_association import unique_classes
 from mcap_landmarks.localization.config import LocalizeConfig
-from mcap_landmarks.localization.decision import Match
+from mcap_landmarks.localization.match import Match
 from mcap_landmarks.localization.repeated_classes import JoinedLocator
 from mcap_landmarks.localization.thesis import locate_as_in_the_thesis
 from mcap_landmarks.localization.unique_classes import UniqueLocator
@@ -39,6 +39,9 @@ from mcap_landmarks.stage import Bundle, InputLog, LeftOut, OdometryAt, Omission
 
 # Bundles that are solved together, or calibrated from; what follows the robot takes them one by one.
 _BATCH, _FOLLOWED = 4096, 64
+# Odds are the exponential of a sum of logarithms in the tens to hundreds, which two machines round differently in the
+# tenth digit or so. They are worth telling apart however small they are; the floor is that of `Evidence.odds_against`.
+_ODDS = Tolerance(1e-300, 1e-4)
 _NO_FRAME = "transforms from the map to odometry that were not written, as odometry names no frame of its own"
 
 Locate = Callable[[Sequence[SceneObjects], Sequence[OdometryAt | None]], list[Match]]
@@ -144,7 +147,9 @@ STAGE = Stage(
         "covariance": Tolerance(1e-12, 1e-6),
         "residual_m": 1e-6,
         "candidate_scores": Tolerance(1e-6, 1e-6),
-        "expected_accidental": Tolerance(1e-12, 1e-4),
+        "expected_accidental": _ODDS,
         "chi2": Tolerance(1e-6, 1e-6),
+        "condition_values": Tolerance(1e-6, 1e-6),  # the odds among them are compared above
+        "condition_limits": Tolerance(0.0, 1e-9),
     },
 )
