@@ -93,7 +93,7 @@ def _look_up(world: World, index: MapIndex, seed: int) -> tuple[float, float, fl
         points.append(observed.positions_xy)
         spread.append(observed.covariances)
         options.extend(observed.hypotheses)
-    likely = matcher.evidence.probabilities(options).reshape(_BATCH, 3, -1)
+    likely = matcher.classes.probabilities(options).reshape(_BATCH, 3, -1)
     spurious = np.full((_BATCH, 3), matcher.config.spurious)
     taken = []
     for _ in range(_ROUNDS):

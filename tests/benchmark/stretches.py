@@ -12,7 +12,7 @@ from mcap_landmarks.estimation.odometry import OdometryNoise
 from mcap_landmarks.geometry.se2 import between
 from mcap_landmarks.localization.match import Match
 from mcap_landmarks.localization.matching import Matcher
-from mcap_landmarks.localization.sequence import Joiner
+from mcap_landmarks.localization.sequence import SequenceLocalizer
 from mcap_landmarks.stage import OdometryAt
 
 from tests.benchmark.worlds import Array, Sensor, World, drive, error, pose_looking_at, scene
@@ -50,14 +50,14 @@ def stretch(
     rng = np.random.default_rng(seed)
     middle = world.positions_xy[rng.integers(0, len(world.positions_xy))]
     truth, odometry = drive(rng, pose_looking_at(rng, middle, 6.0, 10.0), LENGTH_M, STEP_M)
-    joiner = Joiner(matcher, OdometryNoise(), JOIN_M)
+    sequence = SequenceLocalizer(matcher, OdometryNoise(), JOIN_M)
     way_m = turned_rad = 0.0
     for i, (pose, at) in enumerate(zip(truth, odometry, strict=True)):
         if i:
             step = between(odometry[i - 1], at)
             way_m, turned_rad = way_m + float(np.hypot(step[0], step[1])), turned_rad + abs(float(step[2]))
         observed, _ = scene(rng, world, pose, conditions.sensor, None, conditions.misclassified, conditions.spurious)
-        yield joiner.add(observed, OdometryAt("odom", at, np.zeros((3, 3)), way_m, turned_rad)), pose
+        yield sequence.localize(observed, OdometryAt("odom", at, np.zeros((3, 3)), way_m, turned_rad)), pose
 
 
 def in_parallel(one: Callable[[int], T], count: int) -> list[T]:

@@ -49,12 +49,12 @@ def test_lookups_find_what_a_search_of_all_finds(landmark_map: LandmarkMap) -> N
             frozenset(t) for t in index.triangles[near].tolist()
         }
         pair = int(rng.integers(len(lengths)))
-        kinds = index.class_of[index.pairs[pair]]
-        same = (index.class_of[index.pairs] == kinds).all(axis=1) & (np.abs(lengths - lengths[pair]) <= tolerance)
-        hits = index.find_pairs(lengths[[pair]], kinds[None], np.array([tolerance]), 10**6)
+        classes = index.class_of[index.pairs[pair]]
+        same = (index.class_of[index.pairs] == classes).all(axis=1) & (np.abs(lengths - lengths[pair]) <= tolerance)
+        hits = index.find_pairs(lengths[[pair]], classes[None], np.array([tolerance]), 10**6)
         assert {frozenset(hit) for hit in hits.landmarks.tolist()} == {frozenset(p) for p in index.pairs[same].tolist()}
         assert not len(
-            index.find_pairs(lengths[[pair]], kinds[None], np.array([tolerance]), int(same.sum()) // 2).query
+            index.find_pairs(lengths[[pair]], classes[None], np.array([tolerance]), int(same.sum()) // 2).query
         )
 
 

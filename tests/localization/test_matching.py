@@ -11,7 +11,7 @@ from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.index import MapIndex
 from mcap_landmarks.localization.match import Match
 from mcap_landmarks.localization.matching import Matcher
-from mcap_landmarks.localization.sequence import Joiner
+from mcap_landmarks.localization.sequence import SequenceLocalizer
 from mcap_landmarks.maps.model import LandmarkMap, Source
 from mcap_landmarks.messages.match import Status
 from mcap_landmarks.messages.scene import SceneObjects
@@ -61,11 +61,11 @@ def test_unknown_places_are_refused() -> None:
 
 
 def stretch(world: World, seed: int, scale: float = 1.0) -> tuple[list[Match], list[np.ndarray]]:
-    """A joined drive of 20 m past groups that many others look like."""
+    """A drive of 20 m past groups that many others look like, as one sequence."""
     rng = np.random.default_rng(seed)
     start = pose_looking_at(rng, world.positions_xy[len(world.positions_xy) // 2], 6, 10)
     truth, odometry = drive(rng, start, 20.0, 1.0)
-    joiner = Joiner(matcher_of(world), OdometryNoise(), 30.0)
+    sequence = SequenceLocalizer(matcher_of(world), OdometryNoise(), 30.0)
     found, way, turned = [], 0.0, 0.0
     for i, (pose, at) in enumerate(zip(truth, odometry, strict=True)):
         if i:
@@ -73,11 +73,11 @@ def stretch(world: World, seed: int, scale: float = 1.0) -> tuple[list[Match], l
             way, turned = way + float(np.hypot(step[0], step[1])), turned + abs(float(step[2]))
         observed = scene(rng, world, pose, Sensor())[0]
         observed = dataclasses.replace(observed, positions_xy=observed.positions_xy * scale)
-        found.append(joiner.add(observed, OdometryAt("odom", at, np.zeros((3, 3)), way, turned)))
+        found.append(sequence.localize(observed, OdometryAt("odom", at, np.zeros((3, 3)), way, turned)))
     return found, truth
 
 
-def test_joined_bundles_find_the_place_among_many() -> None:
+def test_a_sequence_finds_the_place_among_many() -> None:
     world = random_world(np.random.default_rng(5), 400)
     found_at_the_end = 0
     for seed in range(6):
@@ -95,11 +95,11 @@ def test_joined_bundles_find_the_place_among_many() -> None:
 def test_without_odometry_each_bundle_stands_alone() -> None:
     world = appendix_c(np.random.default_rng(6))
     matcher = matcher_of(world)
-    joiner = Joiner(matcher, OdometryNoise(), 30.0)
+    sequence = SequenceLocalizer(matcher, OdometryNoise(), 30.0)
     for observed, _ in views(world, 20, seed=7):
-        alone, joined = matcher.match([observed])[0], joiner.add(observed, None)
-        assert joined.message.status == alone.message.status
-        assert joined.message.landmark_ids == alone.message.landmark_ids
+        alone, in_sequence = matcher.match([observed])[0], sequence.localize(observed, None)
+        assert in_sequence.message.status == alone.message.status
+        assert in_sequence.message.landmark_ids == alone.message.landmark_ids
 
 
 def test_a_bundle_of_one_object_or_none() -> None:

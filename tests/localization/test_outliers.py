@@ -4,7 +4,7 @@ import numpy as np
 from mcap_landmarks.localization.acceptance import PairDensity
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.index import MapIndex
-from mcap_landmarks.localization.local_map import Surroundings
+from mcap_landmarks.localization.local_map import LocalMap
 from mcap_landmarks.localization.matching import Matcher
 
 from tests.benchmark.stretches import CAMERA, Conditions, judged, stretch
@@ -14,20 +14,20 @@ CONFIG = LocalizeConfig()
 SURE, LIKELY = np.array([0.98, 0.01, 0.01]), np.array([0.01, 0.98, 0.01])
 
 
-def surroundings() -> Surroundings:
+def local_map() -> LocalMap:
     density = PairDensity(np.log([1.0, 100.0]), np.log([1e-3, 1e-3]))
-    return Surroundings(density, np.full(3, 1 / 3), 30.0, CONFIG)
+    return LocalMap(density, np.full(3, 1 / 3), 30.0, CONFIG)
 
 
-def see(around: Surroundings, *objects: tuple[float, float, np.ndarray]) -> np.ndarray:
+def see(around: LocalMap, *objects: tuple[float, float, np.ndarray]) -> np.ndarray:
     """One bundle of objects at places, with the likelihoods of their classes."""
     points = np.array([[x, y] for x, y, _ in objects]).reshape(-1, 2)
     spread = np.tile(0.01**2 * np.eye(2), (len(objects), 1, 1))
-    return around.see(points, spread, np.array([seen for *_, seen in objects]).reshape(-1, 3))
+    return around.update(points, spread, np.array([seen for *_, seen in objects]).reshape(-1, 3))
 
 
 def test_what_is_not_seen_again_is_likelier_no_object() -> None:
-    around = surroundings()
+    around = local_map()
     first = see(around, (5.0, 0.0, SURE), (0.0, 8.0, SURE))
     assert np.allclose(around.spurious_of(first), CONFIG.spurious)
     for x in (-6.0, -9.0, -12.0):
@@ -39,7 +39,7 @@ def test_what_is_not_seen_again_is_likelier_no_object() -> None:
 
 
 def test_many_views_outvote_one_wrong_class() -> None:
-    around = surroundings()
+    around = local_map()
     for seen in (SURE, SURE, LIKELY, SURE, SURE):
         number = see(around, (5.0, 0.0, seen))
     assert len(around) == 1

@@ -1,8 +1,10 @@
 """When is a match no accident: class evidence, density of a map, and the expected number of accidental matches.
 
-A place that the map does not know is taken to look like the map: objects as frequent, as close together, and of the
-same classes. Against that stands what a pose in the map predicts. The likelihood ratio of the two, summed over all
-poses, has expectation one where the place is unknown, so its inverse bounds the expected number of accidents.
+An a-contrario test (Desolneux, Moisan and Morel 2000): a match is accepted if matches as good are hardly to be expected
+where it is wrong; that expectation is the number of false alarms. A place that the map does not know is taken to look
+like the map: objects as frequent, as close together, and of the same classes. Against that stands what a pose in the
+map predicts. The likelihood ratio of the two, summed over all poses, has expectation one where the place is unknown, so
+its inverse bounds the expected number of accidents.
 """
 
 from collections.abc import Sequence
@@ -17,10 +19,15 @@ from mcap_landmarks.messages.hypotheses import Hypotheses
 
 Array = NDArray[np.float64]
 
-# Pairs within this factor of a distance count for the density there.
+# Pairs within this factor of a distance count for the density there: a ring of two thirds of an octave.
 _RATIO = 1.25
+# Landmarks around which pairs are counted: counts of so many are known to 2 percent (their square root).
 _CENTRES = 2000
+# Distances in a factor of two at which the density is known: rings overlap, so that none is left out.
 _PER_OCTAVE = 8
+# Distances between which the density is known: from that of nearest neighbours (their 5 % quantile) to sixty times
+# their median, farther than objects of one bundle are apart; at least three octaves.
+_LOW_QUANTILE, _WIDE, _WIDE_AT_LEAST = 0.05, 60, 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +43,7 @@ class ClassEvidence:
 
     @classmethod
     def of(cls, names: tuple[str, ...], class_of: NDArray[np.int64], misread: float) -> "ClassEvidence":
-        """Frequencies after Good and Turing: classes met only once in the map say that there are more to meet."""
+        """Frequencies after Good and Turing (Good 1953): classes that the map has once say that there are more."""
         counts = np.bincount(class_of, minlength=len(names))
         unseen = (counts == 1).sum() / (len(class_of) + 1)
         return cls(names, (1 - unseen) * counts / len(class_of), misread)
@@ -74,8 +81,8 @@ class PairDensity:
         """Density around landmarks, each distance averaged over a ring; one pair more than was counted."""
         centres = positions[:: max(len(positions) // _CENTRES, 1)]
         nearest = np.asarray(places.query(centres, k=[2])[0])[:, 0]
-        low = max(float(np.quantile(nearest, 0.05)), 1e-6)
-        high = max(float(np.median(nearest)) * 60, 8 * low)
+        low = max(float(np.quantile(nearest, _LOW_QUANTILE)), 1e-6)
+        high = max(float(np.median(nearest)) * _WIDE, _WIDE_AT_LEAST * low)
         steps = int(np.ceil(np.log2(high / low) * _PER_OCTAVE))
         distance = low * 2 ** (np.arange(steps + 1) / _PER_OCTAVE)
         radii = np.concatenate([distance / _RATIO, distance * _RATIO])
@@ -118,7 +125,8 @@ class PairDensity:
 def log_tail(chi2: Array, dof: NDArray[np.int64]) -> Array:
     """Logarithm of the volume in which an accident fits as well as this, over that under a Gaussian's peak.
 
-    A fit better than chi-square's mean counts as the mean: luck must not speak for a match.
+    That is of a ball in `dof` dimensions with squared radius `chi2`. A fit better than chi-square's mean counts as the
+    mean: luck must not speak for a match.
     """
     half_dof = np.maximum(dof, 1) / 2
     half_chi2 = np.maximum(chi2 / 2, half_dof)

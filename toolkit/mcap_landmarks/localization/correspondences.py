@@ -19,7 +19,7 @@ from mcap_landmarks.messages.scene import SceneObjects
 Rows = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-# Larger than this, and the sigma of a bearing leaves the whole circle open.
+# Larger than this, and the sigma of a bearing leaves the whole circle open: three of them are half of it.
 _NO_BEARING_RAD = 1.0
 
 
@@ -44,7 +44,7 @@ class Problem:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Given:
+class Correspondences:
     """Problems as arrays (B, K), padded to the largest; `mask` says what is there. See `solve_poses`."""
 
     landmarks_xy: Array
@@ -71,9 +71,9 @@ class Given:
             spread[i, :k] = landmark_map.covariances[problem.landmarks]
         return cls(landmarks, spread, *polar_from_points(points, covariances), mask)
 
-    def pick(self, rows: Rows) -> "Given":
+    def pick(self, rows: Rows) -> "Correspondences":
         """Some of the problems."""
-        return Given(
+        return Correspondences(
             self.landmarks_xy[rows],
             self.landmark_covariance[rows],
             self.range_m[rows],

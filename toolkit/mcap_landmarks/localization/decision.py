@@ -127,7 +127,7 @@ def of_places(
 def of_place(
     objects: int, known: int, matched: int, expected_accidental: float, covariance: Array, config: LocalizeConfig
 ) -> Decision:
-    """Where classes repeat: a place was found, or followed, at which so many objects are matched.
+    """Where classes repeat: a place was found, or tracked, at which so many objects are matched.
 
     `known` are the objects whose class the map has, `covariance` (3, 3) is that of the pose.
     """

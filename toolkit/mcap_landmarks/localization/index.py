@@ -15,21 +15,24 @@ from mcap_landmarks.maps.neighbours import SMALL_MAP, Neighbours, confirmed
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Classes are one more coordinate of the trees, so far apart that no tolerance reaches over.
+# Classes are one more coordinate of the trees, so far apart (in metres, as the sides) that no tolerance, which is cut
+# at the widest, reaches over.
 _APART = 1e3
 _WIDEST = 400.0
+# Numbers up to here are ranked by counting: an array of so many costs 8 MB, and less time than sorting.
 _SMALL = 10**6
+# Groups whose sides are measured at once: their corners fit into a second-level cache.
 _AT_ONCE = 20_000
 
 
-class _Triples(NamedTuple):
+class _Triangles(NamedTuple):
     """A tree over the sides of triangles, and the numbers of class triples that its last coordinate counts."""
 
     tree: cKDTree
     keys: Ints
 
     @classmethod
-    def of(cls, sides: Array, numbers: Ints) -> "_Triples":
+    def of(cls, sides: Array, numbers: Ints) -> "_Triangles":
         keys, place = _ranks(numbers)
         points = np.empty((len(sides), 4))
         points[:, :3], points[:, 3] = sides, place * _APART
@@ -49,21 +52,21 @@ class _Triples(NamedTuple):
         return np.repeat(known, counts), member
 
 
-class _Doubles(NamedTuple):
+class _Pairs(NamedTuple):
     """Pairs by class pair and length: class pairs lie so far apart on one line that no tolerance reaches over."""
 
     place: Array
     member: Ints
     step_m: float
-    kinds: int
+    class_pairs: int
 
     @classmethod
-    def of(cls, lengths: Array, numbers: Ints) -> "_Doubles":
+    def of(cls, lengths: Array, numbers: Ints) -> "_Pairs":
         step_m = 4 * float(lengths.max(initial=1.0))
         place = numbers * step_m + lengths
         member = np.argsort(place, kind="stable")
-        kinds = int(np.count_nonzero(np.diff(numbers[member]))) + (len(member) > 0)
-        return cls(place[member], member, step_m, kinds)
+        class_pairs = int(np.count_nonzero(np.diff(numbers[member]))) + (len(member) > 0)
+        return cls(place[member], member, step_m, class_pairs)
 
     def near(self, lengths: Array, numbers: Ints, tolerance: Array, most: int) -> tuple[Ints, Ints]:
         """Which of Q queries (M,) each found pair (M,) belongs to; those that find more than `most` find none."""
@@ -104,8 +107,8 @@ class MapIndex:
     places: cKDTree
     triangles: NDArray[np.int32]
     pairs: NDArray[np.int32]
-    _by_sides: _Triples
-    _by_length: _Doubles
+    _by_sides: _Triangles
+    _by_length: _Pairs
 
     @classmethod
     def build(cls, landmark_map: LandmarkMap, neighbours: Neighbours | None = None) -> "MapIndex":
@@ -131,17 +134,17 @@ class MapIndex:
             places,
             near.triangles,
             near.pairs,
-            _Triples.of(_lengths(positions, near.triangles), _number(class_of[near.triangles], len(names))),
-            _Doubles.of(lengths, _number(class_of[near.pairs], len(names))),
+            _Triangles.of(_lengths(positions, near.triangles), _number(class_of[near.triangles], len(names))),
+            _Pairs.of(lengths, _number(class_of[near.pairs], len(names))),
         )
 
     def __len__(self) -> int:
         return len(self.rows)
 
     @property
-    def kinds_of_pairs(self) -> int:
+    def class_pair_count(self) -> int:
         """How many different pairs of classes there are."""
-        return self._by_length.kinds
+        return self._by_length.class_pairs
 
     @property
     def small(self) -> bool:

@@ -70,9 +70,12 @@ class Fix:
 
 
 def without_place(
-    scene: SceneObjects, index: MapIndex, places: Places | None, config: LocalizeConfig, joined: int = 1
+    scene: SceneObjects, index: MapIndex, places: Places | None, config: LocalizeConfig, bundles: int = 1
 ) -> Match:
-    """The match of a bundle of which it is not clear where it was seen: it lists the places that are possible."""
+    """The match of a bundle of which it is not clear where it was seen: it lists the places that are possible.
+
+    `bundles`: how many it was matched together with, itself included.
+    """
     count = len(scene)
     if places is None:
         made = decision.of_unknown_place(count)
@@ -82,7 +85,7 @@ def without_place(
                 scene.frame_id,
                 made.status,
                 expected_accidental=float(len(index)),
-                bundles_joined=joined,
+                bundles_joined=bundles,
                 conditions=made.conditions,
             )
         )
@@ -96,7 +99,7 @@ def without_place(
         candidate_ids=tuple(place_name(index, landmarks) for landmarks in shown),
         candidate_scores=places.scores()[:_LISTED],
         expected_accidental=expected,
-        bundles_joined=joined,
+        bundles_joined=bundles,
         conditions=made.conditions,
     )
     return Match(message)
@@ -109,7 +112,7 @@ def at_place(
     index: MapIndex,
     fix: Fix,
     config: LocalizeConfig,
-    joined: int = 1,
+    bundles: int = 1,
 ) -> Match:
     """The match of a bundle that was seen from a known place; `rows` (K,) are its objects in the scene."""
     turn = np.eye(3)
@@ -131,13 +134,13 @@ def at_place(
         fix.expected_accidental,
         fix.chi2,
         fix.dof,
-        joined,
+        bundles,
         made.conditions,
     )
     return Match.of(message, fix.pose, covariance)
 
 
 def place_name(index: MapIndex, landmarks: Ints) -> str:
-    """The ids of a place's landmarks, the first few, joined by plus signs."""
+    """The ids of a place's landmarks, the first few, with plus signs between."""
     shown = landmarks[landmarks != UNMATCHED][:_LISTED]
     return "+".join(index.landmark_map.ids[index.rows[i]] for i in shown)

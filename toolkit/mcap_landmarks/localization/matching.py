@@ -1,4 +1,4 @@
-"""Match bundles of objects to a landmark map without knowing the pose, and refuse rather than guess."""
+"""Match single bundles of objects to a landmark map without knowing the pose, and refuse rather than guess."""
 
 from collections import defaultdict
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.decision import is_accident
 from mcap_landmarks.localization.index import MapIndex
 from mcap_landmarks.localization.match import Fix, Match, Places, at_place, without_place
-from mcap_landmarks.localization.pose_candidates import Finder
+from mcap_landmarks.localization.pose_candidates import PoseCandidates
 from mcap_landmarks.localization.validation import check_lengths
 from mcap_landmarks.localization.verification import Candidates, Constellations, Fits, Verifier
 from mcap_landmarks.maps.scene_objects import known_covariances
@@ -27,13 +27,17 @@ Bools = NDArray[np.bool_]
 
 # More objects than these, the nearest, say nothing new and cost time.
 _MOST = 24
-# An object is matched if so much of a chi-square lies beyond it, a whole set if this much does.
+# Gates: of true matches one object in 2000 and one set in 10,000 lies beyond them (chi-square of their dimensions).
 _OBJECT, _SET = 5e-4, 1e-4
-# Bundles matched at once, times the square of their objects: bounds the memory.
+# Bundles matched at once, times the square of their objects: bounds the memory, 0.6 MB for the covariances of all.
 _AT_ONCE = 20_000
-# Candidates closer than this are one place; so many places are kept.
+# Candidates closer than this are one place: half of what makes a pose false (1 m, 20 degrees). So many places are kept.
 _SAME_M, _SAME_RAD = 0.5, 0.17
 _PLACES = 32
+# The share of landmarks that are known better than what stands for the map's error in a search.
+_MAP_QUANTILE = 0.9
+# Odds are not told beyond e^50: exp would overflow, and they say no all the same.
+_LOG_MOST = 50.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,12 +60,12 @@ class Matcher:
 
     def __init__(self, index: MapIndex, config: LocalizeConfig) -> None:
         self.index, self.config = index, config
-        self.evidence = ClassEvidence.of(index.names, index.class_of, config.misread)
+        self.classes = ClassEvidence.of(index.names, index.class_of, config.misread)
         self.density = PairDensity.of(index.places, index.positions_xy)
         unknown = np.logical_not(index.covariances.any(axis=(1, 2)))
         spread = np.where(unknown[:, None, None], config.map_sigma_m**2 * np.eye(2), index.covariances)
-        sigma_m = float(np.sqrt(np.quantile(spread[:, [0, 1], [0, 1]].max(axis=1), 0.9)))
-        self._finder = Finder(index, sigma_m)
+        sigma_m = float(np.sqrt(np.quantile(spread[:, [0, 1], [0, 1]].max(axis=1), _MAP_QUANTILE)))
+        self._pose_candidates = PoseCandidates(index, sigma_m)
         self.verifier = Verifier(index, spread, float(chdtri(2, _OBJECT)))
 
     def objects(self, scene: SceneObjects) -> Objects:
@@ -76,7 +80,7 @@ class Matcher:
         rows = np.sort(np.array(known, dtype=np.int64)[nearest])
         check_lengths(scene.positions_xy[rows], self.index.extent_m)
         covariances = known_covariances(scene, self.config.range_sigma_m, self.config.bearing_sigma_rad)
-        probabilities = self.evidence.probabilities([scene.hypotheses[i] for i in rows])
+        probabilities = self.classes.probabilities([scene.hypotheses[i] for i in rows])
         spurious = np.full(len(rows), self.config.spurious)
         return Objects(rows, scene.positions_xy[rows], covariances[rows], probabilities, spurious)
 
@@ -85,22 +89,25 @@ class Matcher:
 
         `spurious` (B, K) is the probability that each is not in the map.
         """
-        log_ratio = self.evidence.log_ratios(probabilities.reshape(-1, probabilities.shape[-1]))
+        log_ratio = self.classes.log_ratios(probabilities.reshape(-1, probabilities.shape[-1]))
         density = self.density.chain(points)
         return Constellations(points, covariance, log_ratio.reshape(probabilities.shape), density, spurious)
 
     def candidates(self, sets: Constellations, fresh: Bools) -> Candidates:
         """Poses to try, from pairs or triangles of objects of which one is `fresh` (B, K)."""
         if sets.points_xy.shape[1] < 3:
-            return self._finder.pairs(sets, fresh)
-        triangles = self._finder.triangles(sets, fresh)
-        if not self._finder.pairs_are_few:
+            return self._pose_candidates.pairs(sets, fresh)
+        triangles = self._pose_candidates.triangles(sets, fresh)
+        if not self._pose_candidates.pairs_are_few:
             return triangles
-        both = zip(triangles, self._finder.pairs(sets, fresh), strict=True)
+        both = zip(triangles, self._pose_candidates.pairs(sets, fresh), strict=True)
         return Candidates(*(np.concatenate(parts) for parts in both))
 
     def places(self, sets: Constellations, candidates: Candidates, tests: int = 1) -> list[Places | None]:
-        """Where each set may have been seen; `tests`: how many sets are tried for the same question."""
+        """Where each set may have been seen; `tests`: how many sets are tried for the same question.
+
+        Each test has its own chance of an accident, so the expected numbers add up (Bonferroni).
+        """
         if not len(candidates.of):
             return [None] * len(sets)
         fits = self.verifier.fit(sets, candidates)
@@ -177,7 +184,10 @@ def is_same_place(pose: Array, others: Array) -> Bools:
 
 
 def _places(fits: Fits, first: int, last: int, tests: int) -> Places | None:
-    """The distinct places among one set's fits, which are sorted by their evidence."""
+    """The distinct places among one set's fits, which are sorted by their evidence.
+
+    Beside accidents count the rivals: the odds of the other places against the best one.
+    """
     if first == last:
         return None
     pose = fits.candidates.pose[first:last]
@@ -188,5 +198,5 @@ def _places(fits: Fits, first: int, last: int, tests: int) -> Places | None:
         left &= ~is_same_place(pose[i], pose)
         kept.append(first + i)
     rivals = fits.log_ratio[kept[1:]] - fits.log_ratio[kept[0]]
-    expected = float(np.exp(np.minimum(logsumexp([fits.log_accidental[first], *rivals]), 50.0)))
+    expected = float(np.exp(np.minimum(logsumexp([fits.log_accidental[first], *rivals]), _LOG_MOST)))
     return Places(fits.pick(np.array(kept)), tests * expected)

@@ -1,13 +1,13 @@
 """Candidate poses of a bundle anywhere in the map, from its pairs and triangles of objects.
 
-This and `verification` find the maximum clique over pairwise consistency: take the pairs (object, landmark) as nodes,
-joined where distances agree. A clique of three nodes or more holds a triangle of objects that is like one of the map,
-and any of its triangles tells the pose under which the verifier finds all the rest of it. So no search over subsets is
-needed, only a triangle out of every clique. Objects are cut into sectors of eight at most, of which all triangles are
-seeds: of up to 8 objects no triangle is missed, of up to 16 any five have three in one sector, of up to 24 any seven
-(what matches less than half of a bundle is not accepted anyway). So the work is bounded without a clock, and the answer
-the same on any machine. The verifier goes by the joint chi-square, which pairwise distances only approximate and which
-tells a clique from its mirror image.
+This and `verification` find the maximum clique over pairwise consistency (Bailey 2002, Mangelson et al. 2018): take
+the pairs (object, landmark) as nodes, with an edge where distances agree. A clique of three nodes or more holds a
+triangle of objects that is like one of the map, and any of its triangles tells the pose under which the verifier finds
+all the rest of it. So no search over subsets is needed, only a triangle out of every clique. Objects are cut into
+sectors of eight at most, all of whose triangles are looked up: of up to 8 objects no triangle is missed, of up to 16
+any five have three in one sector, of up to 24 any seven (what matches less than half of a bundle is not accepted
+anyway). So the work is bounded without a clock, and the answer the same on any machine. The verifier goes by the joint
+chi-square, which pairwise distances only approximate and which tells a clique from its mirror image.
 
 Exact is this where the index holds all triangles of the map (up to a hundred landmarks). Larger maps keep those of near
 landmarks, so there a clique needs one such; triangles of near objects, added for more than eight, are likeliest to be.
@@ -28,25 +28,30 @@ from mcap_landmarks.localization.verification import UNMATCHED, Candidates, Cons
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# All triangles of so many objects are looked up; of more, those within sectors and those of an object with near ones.
+# All triangles of so many objects are looked up, 56 of them; of more objects those within sectors, and those of an
+# object with two of so many near ones.
 _SECTOR = 8
 _NEAR = 4
-# Objects clearly beside each other are so many standard deviations apart.
+# Objects clearly beside each other are so many standard deviations apart: nearer ones may be one that was split.
 _CLEARLY = 5.0
-# Groups that leave the heading more open than this are no start.
+# Groups that leave the heading more open than this are no start: the verifier's steps turn little more (`_STEP_RAD`).
 _HEADING_RAD = 0.2
-# A box around the sides holds nearly all of the ellipsoid that the gate lets pass.
+# Of the sides of true triangles one set in 2000 lies beyond the gate; a box around them, of sigmas each, holds nearly
+# all of the ellipsoid that the gate lets pass.
 _BOX_SIGMAS = 3.5
 _GATE = float(chdtri(3, 0.0005))
-# Classes at least so likely, against the likeliest of an object, are looked for too.
+# Classes at least so likely, against the likeliest of an object, are looked for too: in small maps, where lookups cost
+# little, down to below what `misread` leaves for each of a few classes.
 _PLAUSIBLE, _PLAUSIBLE_IN_SMALL = 0.1, 5e-3
-# Share of a side's variance that no other side has: without it, three objects exactly in line would have none.
+# Share of a side's variance that no other side has: without it, sides of three objects exactly in line would have a
+# covariance without inverse.
 _OWN = 1e-6
-# Pairs of the same classes in the whole map, on average.
+# Pairs of the same classes in the whole map, on average, up to which pairs are looked up beside triangles: of so many a
+# distance known to a few percent leaves one or two.
 _FEW_PAIRS = 20
-# A pair that fits in so many places says nothing.
+# A pair that fits in so many places says nothing, and would cost as many verifications.
 _MOST_HITS = 500
-# Poses so close to one another are tried once.
+# Poses so close to one another are tried once: half of what is one place (`matching._SAME_M`).
 _SAME_M, _SAME_RAD = 0.25, 0.1
 
 
@@ -59,7 +64,7 @@ class _Queries(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Finder:
+class PoseCandidates:
     """Looks up groups of objects in a map whose landmarks are known to `map_sigma_m`."""
 
     index: MapIndex
@@ -68,7 +73,7 @@ class Finder:
     @property
     def pairs_are_few(self) -> bool:
         """Whether the map has so many classes that pairs are worth looking up beside triangles."""
-        return len(self.index.pairs) <= _FEW_PAIRS * self.index.kinds_of_pairs
+        return len(self.index.pairs) <= _FEW_PAIRS * self.index.class_pair_count
 
     def triangles(self, sets: Constellations, fresh: NDArray[np.bool_]) -> Candidates:
         """Candidates from triangles of objects, K >= 3, of those that have a `fresh` one (B, K) among them."""
@@ -159,7 +164,7 @@ class Finder:
     def _candidates(
         self, sets: Constellations, queries: _Queries, query: Ints, landmarks: Ints, fits: Array
     ) -> Candidates:
-        """Poses of the hits, the best fitting one where several say the same."""
+        """Poses of the hits by closed-form least squares (Procrustes; Umeyama 1991), of those alike the best."""
         of, objects = queries.of[query], queries.objects[query]
         points, places = sets.points_xy[of[:, None], objects], self.index.positions_xy[landmarks]
         x, y, cosine, sine = closed_form.fit(

@@ -10,37 +10,42 @@ from mcap_landmarks.estimation.pose import position_sigma
 from mcap_landmarks.estimation.ranges import PositionSolutions, solve_ranges
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.localization.config import LocalizeConfig
-from mcap_landmarks.localization.correspondences import Bools, Given, Problem
+from mcap_landmarks.localization.correspondences import Bools, Correspondences, Problem
 from mcap_landmarks.localization.decision import chi2_limits, of_position
 from mcap_landmarks.localization.match import Match
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.messages.match import LandmarkMatch, Status
 
-# Mirror images so close are one position.
+# Mirror images within so many standard deviations are one position.
 _SAME_SIGMAS = 3.0
 
 
-def by_bearings(given: Given, mask: Bools) -> PoseSolutions:
+def by_bearings(pairs: Correspondences, mask: Bools) -> PoseSolutions:
     """Poses from the bearings that `mask` (B, K) leaves."""
-    variance = given.covariance[..., 1, 1]
-    first = solve_bearings(given.landmarks_xy, given.bearing_rad, variance, mask=mask)
-    distance_m = distances(first.map_from_base, given)
+    variance = pairs.covariance[..., 1, 1]
+    first = solve_bearings(pairs.landmarks_xy, pairs.bearing_rad, variance, mask=mask)
+    distance_m = distances(first.map_from_base, pairs)
     # Seen from where the robot is, the landmark's own error is an angle.
-    variance = variance + _landmark_variance(given) / np.maximum(distance_m, 1e-9) ** 2
-    return solve_bearings(given.landmarks_xy, given.bearing_rad, variance, mask=mask)
+    variance = variance + _landmark_variance(pairs) / np.maximum(distance_m, 1e-9) ** 2
+    return solve_bearings(pairs.landmarks_xy, pairs.bearing_rad, variance, mask=mask)
 
 
 def locate_by_ranges(
-    problems: Sequence[Problem], given: Given, landmark_map: LandmarkMap, config: LocalizeConfig
+    problems: Sequence[Problem], pairs: Correspondences, landmark_map: LandmarkMap, config: LocalizeConfig
 ) -> list[Match]:
     """Positions without heading of bundles of ranges; where the mirror image fits as well, both are candidates."""
-    variance = given.covariance[..., 0, 0] + _landmark_variance(given)
-    solved = solve_ranges(given.landmarks_xy, given.range_m, variance, mask=given.mask)
-    return [_judge(problem, i, solved, given, landmark_map, config) for i, problem in enumerate(problems)]
+    variance = pairs.covariance[..., 0, 0] + _landmark_variance(pairs)
+    solved = solve_ranges(pairs.landmarks_xy, pairs.range_m, variance, mask=pairs.mask)
+    return [_match(problem, i, solved, pairs, landmark_map, config) for i, problem in enumerate(problems)]
 
 
-def _judge(
-    problem: Problem, i: int, solved: PositionSolutions, given: Given, landmark_map: LandmarkMap, config: LocalizeConfig
+def _match(
+    problem: Problem,
+    i: int,
+    solved: PositionSolutions,
+    pairs: Correspondences,
+    landmark_map: LandmarkMap,
+    config: LocalizeConfig,
 ) -> Match:
     both, chi2_of = solved.position_xy[i], solved.chi2[i]
     position, covariance, dof = both[0], solved.covariance[i, 0], int(solved.dof[i])
@@ -51,7 +56,7 @@ def _judge(
     limit = float(chi2_limits(dof, config))
     made = of_position(problem.decision, float(chi2_of[0]), limit, float(sigma_m), mirror_odds, config)
     k = len(problem.objects)
-    off_m = np.abs(distances(position[None], given.pick(np.array([i])))[0, :k] - given.range_m[i, :k])
+    off_m = np.abs(distances(position[None], pairs.pick(np.array([i])))[0, :k] - pairs.range_m[i, :k])
     shown = both if made.status == Status.AMBIGUOUS else both[:0]
     match = LandmarkMatch(
         problem.scene.stamp_ns,
@@ -70,13 +75,13 @@ def _judge(
     return Match.of(match, np.array([*position, 0.0]))
 
 
-def distances(poses: Array, given: Given) -> Array:
+def distances(poses: Array, pairs: Correspondences) -> Array:
     """Distances (B, K) to the landmarks from poses (B, 3) or positions (B, 2)."""
-    distance_m: Array = np.linalg.norm(given.landmarks_xy - poses[:, None, :2], axis=-1)
+    distance_m: Array = np.linalg.norm(pairs.landmarks_xy - poses[:, None, :2], axis=-1)
     return distance_m
 
 
-def _landmark_variance(given: Given) -> Array:
+def _landmark_variance(pairs: Correspondences) -> Array:
     """Variance (B, K) of each landmark in any one direction."""
-    variance: Array = np.trace(given.landmark_covariance, axis1=2, axis2=3) / 2
+    variance: Array = np.trace(pairs.landmark_covariance, axis1=2, axis2=3) / 2
     return variance

@@ -11,7 +11,7 @@ from mcap_landmarks.estimation.pose import solve_poses
 from mcap_landmarks.geometry.se2 import Array, transform_points
 from mcap_landmarks.localization.class_association import unique_classes
 from mcap_landmarks.localization.config import LocalizeConfig
-from mcap_landmarks.localization.correspondences import Bools, Given, Problem, Rows
+from mcap_landmarks.localization.correspondences import Bools, Correspondences, Problem, Rows
 from mcap_landmarks.localization.decision import BEARINGS, LEAST_OF_ONE_KIND, RANGES, chi2_limits, of_pose
 from mcap_landmarks.localization.match import Match
 from mcap_landmarks.localization.ranges_or_bearings import by_bearings, distances, locate_by_ranges
@@ -21,7 +21,7 @@ from mcap_landmarks.messages.match import LandmarkMatch
 from mcap_landmarks.messages.scene import SceneObjects
 
 
-class UniqueLocator:
+class UniqueClassLocalizer:
     """Localizes the scenes of one log, batch by batch; what its sensor's ranges mean is found from the first batch."""
 
     def __init__(self, landmark_map: LandmarkMap, config: LocalizeConfig) -> None:
@@ -39,34 +39,34 @@ class UniqueLocator:
 
     def _located(self, problems: Sequence[Problem]) -> list[Match]:
         """Locate all, those of ranges or bearings alone as such."""
-        given = Given.of(problems, self._map, self._config)
-        ranges, bearings = given.ranges_alone(), given.bearings_alone()
+        pairs = Correspondences.of(problems, self._map, self._config)
+        ranges, bearings = pairs.ranges_alone(), pairs.bearings_alone()
         asked = list(problems)
         for i in np.flatnonzero(ranges | bearings).tolist():
             asked[i] = problems[i].of_one_kind(RANGES if ranges[i] else BEARINGS)
         many = np.array([problem.decision.holds for problem in asked])
         found = {i: _refused(asked[i]) for i in np.flatnonzero(~many).tolist()}
 
-        def put(chosen: Bools, solve: Callable[[Sequence[Problem], Given], list[Match]]) -> None:
+        def put(chosen: Bools, solve: Callable[[Sequence[Problem], Correspondences], list[Match]]) -> None:
             rows = np.flatnonzero(chosen)
             if len(rows):
                 which = rows.tolist()
-                found.update(zip(which, solve([asked[i] for i in which], given.pick(rows)), strict=True))
+                found.update(zip(which, solve([asked[i] for i in which], pairs.pick(rows)), strict=True))
 
         put(many & ~ranges & ~bearings, self._solve)
         put(bearings & many, self._by_bearings)
         put(ranges & many, lambda chosen, part: locate_by_ranges(chosen, part, self._map, self._config))
         return [found[i] for i in range(len(problems))]
 
-    def _by_bearings(self, problems: Sequence[Problem], given: Given) -> list[Match]:
-        solved, mask = _fitting(lambda mask: by_bearings(given, mask), given.mask, LEAST_OF_ONE_KIND, self._config)
-        distance_m = distances(solved.map_from_base, given)
+    def _by_bearings(self, problems: Sequence[Problem], pairs: Correspondences) -> list[Match]:
+        solved, mask = _fitting(lambda mask: by_bearings(pairs, mask), pairs.mask, LEAST_OF_ONE_KIND, self._config)
+        distance_m = distances(solved.map_from_base, pairs)
         return [
             _match(problem, i, solved, mask[i], distance_m[i], self._map, self._config)
             for i, problem in enumerate(problems)
         ]
 
-    def _solve(self, problems: Sequence[Problem], given: Given) -> list[Match]:
+    def _solve(self, problems: Sequence[Problem], pairs: Correspondences) -> list[Match]:
         """Solve all; drop the worst observation of those that do not fit while three or more are left.
 
         Raises:
@@ -79,30 +79,30 @@ class UniqueLocator:
         )
         if self._sensor is None:
             self._sensor = calibrate(
-                given.landmarks_xy,
-                given.range_m,
-                given.bearing_rad,
-                given.covariance,
-                landmark_covariance=given.landmark_covariance,
-                mask=given.mask,
+                pairs.landmarks_xy,
+                pairs.range_m,
+                pairs.bearing_rad,
+                pairs.covariance,
+                landmark_covariance=pairs.landmark_covariance,
+                mask=pairs.mask,
             )
-        distance_m = self._sensor.distance_m(given.range_m, given.bearing_rad)
-        # The log tells how range and bearing compare; in all, sigmas stay as large as they are given.
+        distance_m = self._sensor.distance_m(pairs.range_m, pairs.bearing_rad)
+        # The log tells how range and bearing compare; in all, sigmas stay as large as they are pairs.
         shape = self._sensor.scale / self._sensor.scale.max()
-        noise = given.covariance * np.outer(shape, shape)
+        noise = pairs.covariance * np.outer(shape, shape)
 
         def solve(mask: Bools) -> PoseSolutions:
             return solve_poses(
-                given.landmarks_xy,
+                pairs.landmarks_xy,
                 distance_m,
-                given.bearing_rad,
+                pairs.bearing_rad,
                 noise,
-                landmark_covariance=given.landmark_covariance,
+                landmark_covariance=pairs.landmark_covariance,
                 mask=mask,
                 robust_dof=config.robust_dof or None,
             )
 
-        solutions, mask = _fitting(solve, given.mask, 2, config)
+        solutions, mask = _fitting(solve, pairs.mask, 2, config)
         return [
             _match(problem, i, solutions, mask[i], distance_m[i], self._map, config)
             for i, problem in enumerate(problems)
@@ -112,7 +112,10 @@ class UniqueLocator:
 def _fitting(
     solve: Callable[[Bools], PoseSolutions], mask: Bools, least: int, config: LocalizeConfig
 ) -> tuple[PoseSolutions, Bools]:
-    """Solutions without the worst of what does not fit, of which `least` stay; and what (B, K) stays."""
+    """Solutions without the worst of what does not fit, of which `least` stay; and what (B, K) stays.
+
+    One outlier at a time, by its normalised residual: data snooping (Baarda 1968) until the whole fits.
+    """
     mask = mask.copy()
     while True:
         solutions = solve(mask)

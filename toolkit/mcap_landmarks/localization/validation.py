@@ -8,10 +8,12 @@ from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.maps.model import LandmarkMap
 
+# A millimetre is less than any map is good for: landmarks within it have no geometry.
 _ONE_PLACE_M = 1e-3
 # No sensor sees an object farther away, and no map has its landmarks farther apart: beyond, the unit is wrong.
 _FARTHEST_M, _SPARSEST_M = 500.0, 200.0
-# Lengths of the same things that differ by more than this, most of them and not just few, are in two units.
+# Lengths of the same things that differ by more than this, most of them and not just few, are in two units: between
+# metres and millimetres are 1000, of which wrong pairs and errors do not take away a factor of five.
 _OFF, _FEW = 200.0, 4
 
 

@@ -1,4 +1,9 @@
-"""Do objects fit the map at a pose? Association, generalised least squares and chi-square, many poses at once."""
+"""Do objects fit the map at a pose? Association, generalised least squares and chi-square, many poses at once.
+
+Poses are estimated by Gauss-Newton on SE(2) with a right perturbation, a small motion in the base frame (Sola et al.
+2018): there the objects' covariance is the same for every pose. Objects are gated by their squared Mahalanobis distance
+(Bar-Shalom and Fortmann 1988), and outliers dropped by data snooping (Baarda 1968).
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -15,11 +20,14 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 UNMATCHED = -1
-# Landmarks looked at around the place where an object is expected.
+# Landmarks looked at around the place where an object is expected: seldom do more fit within the gate.
 _NEAR = 3
-# Turns in one step of least squares stay below this, where the linear model still holds.
+# Turns in one step of least squares stay below this, where the linear model still holds (sine against angle: 1.5 %).
 _STEP_RAD = 0.3
+# Gauss-Newton steps: starts are closed-form fits or predictions, from where it converges quadratically.
 _STEPS = 2
+# An outlier is dropped of more objects than these: of three, any two would do without the third.
+_TESTABLE = 3
 _TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
@@ -109,8 +117,8 @@ class Solved(NamedTuple):
         for whole, part in zip(_arrays(self), _arrays(other), strict=True):
             whole[rows] = part
 
-    def force(self) -> Array:
-        """How hard (M, 2K) the objects pull at where the rest, pose included, would have them."""
+    def weighted_residuals(self) -> Array:
+        """Residuals (M, 2K) at the least-squares solution, times their weights: what data snooping tests."""
         moved = (self.weight @ self.residual[..., None])[..., 0]
         pull = self.jacobian.swapaxes(1, 2) @ moved[..., None]
         pull += self.prior.information @ se2.between(self.candidates.pose, self.prior.pose)[..., None]
@@ -122,7 +130,7 @@ class Solved(NamedTuple):
 class Verifier:
     """Fits candidates to a map whose landmarks have covariances `spread` (N, 2, 2), none of them unknown.
 
-    An object matches a landmark if its squared Mahalanobis distance is below `gate`.
+    An object matches a landmark if its squared Mahalanobis distance is below `gate`, and the evidence gains by it.
     """
 
     index: MapIndex
@@ -147,7 +155,7 @@ class Verifier:
         return solved
 
     def solve(self, sets: Constellations, candidates: Candidates, prior: Prior) -> Solved:
-        """Gauss-Newton in the base frame, where the objects' covariance is the same for every pose."""
+        """The poses that least squares gives the candidates, none of which is matched anew."""
         of, pose, landmarks = candidates
         count, k = landmarks.shape
         used = landmarks != UNMATCHED
@@ -217,15 +225,18 @@ class Verifier:
         return np.asarray(self.index.places.query(places, k=np.arange(1, count + 1))[1], dtype=np.int64)
 
     def _without_worst(self, _sets: Constellations, solved: Solved) -> Ints:
-        """Landmarks (M, K) without the object that the others of its candidate, or what was known, least agree with."""
+        """Landmarks (M, K) without the object that the others of its candidate, or what was known, least agree with.
+
+        Baarda's test of one outlier at a time, with two coordinates each: weighted residuals over their own covariance.
+        """
         weight, used = solved.weight, solved.used
         pulled = weight @ solved.jacobian
         left = blocks(weight - pulled @ solved.covariance @ pulled.swapaxes(1, 2))
-        force = solved.force().reshape(*used.shape, 2)
+        weighted = solved.weighted_residuals().reshape(*used.shape, 2)
         known = solved.prior.information.any(axis=(1, 2))
-        testable = used & ((used.sum(axis=1) > 3) | known)[:, None]
+        testable = used & ((used.sum(axis=1) > _TESTABLE) | known)[:, None]
         left = np.where(testable[..., None, None], left, np.eye(2))
-        apart = (force[..., None, :] @ np.linalg.solve(left, force[..., None]))[..., 0, 0]
+        apart = (weighted[..., None, :] @ np.linalg.solve(left, weighted[..., None]))[..., 0, 0]
         apart = np.where(testable, apart, 0.0)
         worst = apart.argmax(axis=1)
         landmarks = solved.candidates.landmarks.copy()
@@ -234,9 +245,10 @@ class Verifier:
         return landmarks
 
     def _score(self, sets: Constellations, solved: Solved) -> Fits:
+        """The evidence for candidates: the likelihood integrated over the pose, by Laplace's method (MacKay 1992)."""
         (of, _, landmarks), used = solved.candidates, solved.used
         matched = used.sum(axis=1)
-        chi2 = (solved.residual * solved.force()).sum(axis=1)
+        chi2 = (solved.residual * solved.weighted_residuals()).sum(axis=1)
         dof = np.maximum(2 * matched - 3, 0)
         peak = (1.5 - matched) * np.log(2 * np.pi) - solved.log_det / 2
         peak += np.linalg.slogdet(solved.covariance)[1] / 2

@@ -23,9 +23,9 @@ from mcap_landmarks.geometry.se2 import compose, inverse
 from mcap_landmarks.localization.class_association import unique_classes
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.match import Match
-from mcap_landmarks.localization.repeated_classes import JoinedLocator
+from mcap_landmarks.localization.repeated_classes import RepeatedClassLocalizer
 from mcap_landmarks.localization.thesis import locate_as_in_the_thesis
-from mcap_landmarks.localization.unique_classes import UniqueLocator
+from mcap_landmarks.localization.unique_classes import UniqueClassLocalizer
 from mcap_landmarks.localization.validation import check_map
 from mcap_landmarks.maps.database import read_map, read_neighbours
 from mcap_landmarks.maps.map_message import scene_from_map
@@ -37,8 +37,8 @@ from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.stage import Bundle, InputLog, LeftOut, OdometryAt, Omission, Stage, Stamped, Tolerance
 
-# Bundles that are solved together, or calibrated from; what follows the robot takes them one by one.
-_BATCH, _FOLLOWED = 4096, 64
+# Bundles that are solved together, or calibrated from; a sequence takes them one by one.
+_BATCH, _SEQUENCE = 4096, 64
 # Odds are the exponential of a sum of logarithms in the tens to hundreds, which two machines round differently in the
 # tenth digit or so. They are worth telling apart however small they are; the floor is that of `Evidence.odds_against`.
 _ODDS = Tolerance(1e-300, 1e-4)
@@ -82,10 +82,10 @@ def _method(path: Path, landmark_map: LandmarkMap, config: LocalizeConfig) -> tu
     if config.method == "thesis":
         return lambda scenes, _odometry: locate_as_in_the_thesis(scenes, landmark_map, config), _BATCH
     if len(unique_classes(landmark_map)) == np.count_nonzero(~landmark_map.tentative):
-        unique = UniqueLocator(landmark_map, config)
+        unique = UniqueClassLocalizer(landmark_map, config)
         return lambda scenes, _odometry: unique.locate(scenes), _BATCH
-    joined = JoinedLocator(landmark_map, read_neighbours(path, landmark_map), config)
-    return joined.locate, _FOLLOWED if config.join_m > 0 else _BATCH
+    repeated = RepeatedClassLocalizer(landmark_map, read_neighbours(path, landmark_map), config)
+    return repeated.locate, _SEQUENCE if config.join_m > 0 else _BATCH
 
 
 def _messages(bundle: Bundle, match: Match, frame: str, config: LocalizeConfig) -> Iterator[Stamped | Omission]:
