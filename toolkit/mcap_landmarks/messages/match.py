@@ -96,7 +96,7 @@ class LandmarkMatch:
         )
 
 
-def _conditions(ros: Any) -> tuple[Condition, ...]:
+def _conditions(ros: RosObject) -> tuple[Condition, ...]:
     """The conditions of a match; a log that was written before there were any has no such fields."""
     if not hasattr(ros, "condition_names"):
         return ()
