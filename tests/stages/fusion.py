@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, SCAN_OBJECTS, SCENE_OBJECTS, TF_STATIC
+from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.geometry.se2 import Array, exp, inverse, transform_points
@@ -15,7 +16,7 @@ from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.stage import Bundle, OdometryAt, Omission
-from mcap_landmarks.stages.fuse import FuseConfig, process
+from mcap_landmarks.stages.fuse import process
 
 SIZE_PX = (640, 480)
 K = np.array([[530.5, 0.0, 320.0], [0.0, 530.5, 240.0], [0.0, 0.0, 1.0]])

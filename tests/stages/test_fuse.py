@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from mcap_landmarks.channels import DETECTIONS, SCENE_MARKERS
 from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.messages.codec import encode
 from mcap_landmarks.messages.markers import MarkerArray, Shape
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.typestore import typestore
 from mcap_landmarks.stage import Bundle, Stamped
-from mcap_landmarks.stages.fuse import FuseConfig, process
+from mcap_landmarks.stages.fuse import process
 
 from tests.stages.fusion import (
     KNOWN,

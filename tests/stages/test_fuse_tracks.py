@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from mcap_landmarks.channels import SCAN_OBJECTS
+from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.stage import Bundle, OdometryAt
-from mcap_landmarks.stages.fuse import FuseConfig
 
 from tests.stages.fusion import THREE, Thing, boxes, bundle, detected, fused, scanned
 

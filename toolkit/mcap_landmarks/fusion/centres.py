@@ -5,13 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcap_landmarks.classes import Size
-from mcap_landmarks.fusion.box_geometry import Sights, View
-from mcap_landmarks.geometry.angles import wrap
+from mcap_landmarks.fusion.box_geometry import BoxGeometry
+from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.scan_objects import ScanObjects
 
 SURFACE = ""
 """The hypothesis of no known shape: the middle of the near surface."""
+
+RESOLVED = 0.01
+"""A shape that fits a cluster worse has no centre that counts: hits of several things have run together."""
 
 _LEAST_FIT = 1e-3
 _RADIUS_ERROR = 0.3
@@ -31,23 +34,31 @@ def centres_of(objects: ScanObjects, name: str, radii_m: Array, *, has_shape: bo
 
     A cluster without a hypothesis of a class that has shapes fits none of them.
     """
-    count = len(objects)
-    positions, covariances, fits = (
-        np.zeros((count, 2)),
-        np.zeros((count, 2, 2)),
-        np.full(count, _LEAST_FIT if has_shape else 1.0),
+    found = [centre_of(objects, i, name, radii_m[i], has_shape=has_shape) for i in range(len(objects))]
+    return Centres(
+        np.array([position for position, _, _ in found]).reshape(-1, 2),
+        np.array([covariance for _, covariance, _ in found]).reshape(-1, 2, 2),
+        np.array([fit for _, _, fit in found], dtype=np.float64),
     )
-    for i, options in enumerate(objects.hypotheses):
-        row = next((k for k, (known, _) in enumerate(options) if known == name), None)
-        if row is None:
-            positions[i], covariances[i] = _behind(objects.positions_xy[i][-1], objects.covariances[i][-1], radii_m[i])
-        else:
-            positions[i], covariances[i] = objects.positions_xy[i][row], objects.covariances[i][row]
-            fits[i] = fits_of(objects, i)[name]
-    return Centres(positions, covariances, fits)
 
 
-def fits_of(objects: ScanObjects, i: int) -> dict[str, float]:
+def centre_of(
+    objects: ScanObjects, i: int, name: str, radius_m: float, *, has_shape: bool
+) -> tuple[Array, Array, float]:
+    """Position (2,), covariance (2, 2) and fit of one object, as in `centres_of`."""
+    row = next((k for k, (known, _) in enumerate(objects.hypotheses[i]) if known == name), None)
+    if row is None:
+        place = _behind(objects.positions_xy[i][-1], objects.covariances[i][-1], radius_m)
+        return *place, _LEAST_FIT if has_shape else 1.0
+    return objects.positions_xy[i][row], objects.covariances[i][row], _fits_of(objects, i)[name]
+
+
+def is_resolved(objects: ScanObjects, i: int, name: str, *, has_shape: bool) -> bool:
+    """Whether the scan shows where the centre of an object is, if it is of a class."""
+    return _fits_of(objects, i).get(name, 0.0 if has_shape else 1.0) >= RESOLVED
+
+
+def _fits_of(objects: ScanObjects, i: int) -> dict[str, float]:
     """How well the scan fits each class: the probability of its shapes where only they and the bare surface could be.
 
     It is very small where hits of several things have run together.
@@ -59,16 +70,17 @@ def fits_of(objects: ScanObjects, i: int) -> dict[str, float]:
     return {name: max(share / (share + bare), _LEAST_FIT) if share else _LEAST_FIT for name, share in shares.items()}
 
 
-def radii_in_boxes(objects: ScanObjects, view: View, sights: Sights, box: int, size: Size) -> Array:
+def radii_in_boxes(objects: ScanObjects, view: CameraView, boxes: BoxGeometry, box: int, size: Size) -> Array:
     """Radii (N,) of discs that have the objects' surfaces in front and fill the width of one box."""
     surfaces = np.array([positions[-1] for positions in objects.positions_xy]).reshape(-1, 2)
     distance = np.hypot(*view.from_camera(surfaces).T)
-    sine = min(float(np.sin(abs(wrap(sights.left[box] - sights.right[box])) / 2)), 0.9)
+    sine = min(float(np.sin(boxes.half[box])), 0.9)
     radii: Array = np.minimum(distance * sine / (1 - sine), size.width_m[1] / 2)
     return radii
 
 
 def _behind(surface_xy: Array, covariance: Array, radius_m: float) -> tuple[Array, Array]:
+    """Centre and covariance of a disc that has a surface in front."""
     distance = float(np.hypot(*surface_xy))
     ahead = surface_xy / distance if distance > 0 else np.array([1.0, 0.0])
     return surface_xy + radius_m * ahead, covariance + (_RADIUS_ERROR * radius_m) ** 2 * np.outer(ahead, ahead)

@@ -3,36 +3,25 @@
 import math
 from dataclasses import dataclass, field
 
+from mcap_landmarks.fusion.config import FuseConfig
+
 _REMEMBERED, _TOO_FAR_ASIDE = 5, 4.0
 
 
-@dataclass(frozen=True, slots=True)
-class Weighing:
-    """How much a detection or the lack of one counts.
-
-    A track is of a class with odds `prior` before anything is seen. A detection multiplies the odds of its class by how
-    much likelier it is if the track is of it, at most by `gain`, and those of every other by `confusion` times that,
-    since some detections have a wrong class; an image that should show the object but has no box there multiplies all
-    by `missed`. Odds stay below `most`, so that what was learned wrong can be forgotten. A track that no later scan
-    can go on with begins at odds `prior_alone`: no second look could mend what is left out.
-    """
-
-    prior: float = 0.03
-    prior_alone: float = 0.3
-    gain: float = 200.0
-    confusion: float = 0.05
-    missed: float = 0.2
-    most: float = 1e3
-
-
 @dataclass(slots=True)
-class Belief:
-    """One track's log odds by class; `other` is that of every class which no detection has named.
+class ClassBelief:
+    """One track's log odds by class: a Bayes filter of a state that stays (Thrun, Burgard, Fox 2005, section 4.2).
 
-    `aside` is how far aside of their middles detections were on average lately, in sigmas, positive to the left.
+    `other` is that of every class which no detection has named. A track is of a class with odds `prior_odds` before
+    anything is seen. A detection multiplies the odds of its class by how much likelier it is if the track is of it, at
+    most by `hit_odds`, and those of every other by `confusion` times that, since some detections have a wrong class; an
+    image that should show the object but has no box there multiplies all by `miss_odds`. Odds stay below `max_odds`,
+    so that what was learned wrong can be forgotten. A track that no later scan can go on with is `alone`, and begins
+    at odds `prior_odds_alone`: no second look could mend what is left out. `aside` is how far aside of their middles
+    detections were on average lately, in sigmas, positive to the left.
     """
 
-    weighing: Weighing
+    config: FuseConfig
     alone: bool = False
     other: float = 0.0
     log_odds: dict[str, float] = field(default_factory=dict)
@@ -41,7 +30,7 @@ class Belief:
     aside: float = 0.0
 
     def __post_init__(self) -> None:
-        self.other = math.log(self.weighing.prior_alone if self.alone else self.weighing.prior)
+        self.other = math.log(self.config.prior_odds_alone if self.alone else self.config.prior_odds)
 
     def hit(self, name: str, ratio: float, aside: float, fresh: float) -> None:
         """A detection of a class fell on the track, so many sigmas aside of its middle.
@@ -54,9 +43,9 @@ class Belief:
         if self.hits > 1 and abs(self.aside) * math.sqrt(min(self.hits, _REMEMBERED)) > _TOO_FAR_ASIDE:
             self.miss(fresh)
             return
-        weighing = self.weighing
-        whole = weighing.missed + (1 - weighing.missed) * min(ratio, weighing.gain)
-        gain, confused = fresh * math.log(whole), math.log(weighing.confusion)
+        missed = self.config.miss_odds
+        whole = missed + (1 - missed) * min(ratio, self.config.hit_odds)
+        gain, confused = fresh * math.log(whole), math.log(self.config.confusion)
         self.log_odds.setdefault(name, self.other)
         self.log_odds = {known: value + gain + confused for known, value in self.log_odds.items()}
         self.log_odds[name] -= confused
@@ -65,15 +54,20 @@ class Belief:
 
     def miss(self, fresh: float) -> None:
         """An image shows the track's place, and nothing there; it counts to a share `fresh`."""
-        lost = fresh * math.log(self.weighing.missed)
+        lost = fresh * math.log(self.config.miss_odds)
         self.log_odds = {name: value + lost for name, value in self.log_odds.items()}
         self.other += lost
         self._limit()
 
+    def measure(self, name: str, radius_m: float) -> None:
+        """A box of a class had the width of a disc of a radius; the last three count about as much as all before."""
+        before = self.radii_m.get(name, radius_m)
+        self.radii_m[name] = 0.7 * before + 0.3 * radius_m
+
     def _limit(self) -> None:
         """Keep what is said for and against the track within bounds."""
-        least = math.log(self.weighing.prior / self.weighing.most)
-        over = max(max([*self.log_odds.values(), self.other]) - math.log(self.weighing.most), 0.0)
+        least = math.log(self.config.prior_odds / self.config.max_odds)
+        over = max(max([*self.log_odds.values(), self.other]) - math.log(self.config.max_odds), 0.0)
         self.log_odds = {name: max(value - over, least) for name, value in self.log_odds.items()}
         self.other = max(self.other - over, least)
 
@@ -88,3 +82,7 @@ class Belief:
         odds = {name: math.exp(value) for name, value in self.log_odds.items()}
         whole = sum(odds.values()) + 1.0
         return sorted(((name, value / whole) for name, value in odds.items()), key=lambda entry: (-entry[1], entry[0]))
+
+    def best(self) -> tuple[str, float]:
+        """The most probable class that detections named, and its probability; no class if there was none."""
+        return self.probabilities()[0] if self.log_odds else ("", 0.0)
