@@ -12,9 +12,9 @@ from mcap_landmarks.messages.codec import decode as decode_message
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.runs.pipeline import run_stages
 from mcap_landmarks.runs.plan import Request
-from mcap_landmarks.stages.detect import DetectConfig, decode, input_size, thresholds
-from mcap_landmarks.vision.contract import read_contract
-from mcap_landmarks.vision.letterbox import fit, tensor
+from mcap_landmarks.vision.config import DetectConfig
+from mcap_landmarks.vision.detection import find, prepare, thresholds
+from mcap_landmarks.vision.detector import read_detector
 from mcap_landmarks.vision.session import open_session
 from mcap_landmarks_generator.assets.catalog import COCO_ID, HELD_OUT_SEEDS
 from mcap_landmarks_generator.camera import Intrinsics
@@ -42,24 +42,19 @@ class Detector:
     """The bundled model, run as the stage runs it."""
 
     def __init__(self) -> None:
-        self._session = open_session(resources.detector())
-        self._contract = read_contract(self._session, None, "yolov5")
-        self.thresholds = self._contract.confidence
-        names = self._contract.names
-        self._shipped = np.array([self.thresholds.get(name, 1.0) for name in names])
         self._config = DetectConfig(confidence=LEAST_SCORE)
-        self._above = thresholds(self._contract, self._config)
+        self._model = read_detector(open_session(resources.detector()), None, self._config)
+        self.thresholds = self._model.confidence
+        self._shipped = np.array([self.thresholds.get(name, 1.0) for name in self._model.names])
+        self._above = thresholds(self._model, self._config)
 
     def find(self, image: NDArray[np.uint8]) -> Found:
         """What it finds, down to scores far below its thresholds, so that precision has a curve.
 
         Scores are in units of their class's threshold: `SHIPPED` is where the stage cuts.
         """
-        size = (image.shape[0], image.shape[1])
-        input_px = input_size(self._contract, size, self._config)
-        letterbox = fit(size, input_px)
-        outputs = self._session.run(tensor(image, letterbox, input_px, self._contract.dtype))
-        found = decode(outputs, letterbox, input_px, self._contract, self._above, self._config)
+        prepared = prepare(image, self._model, self._config)
+        found = find(self._model.run(prepared.array), prepared, self._model, self._above, self._config)
         scores = found.scores.astype(float) / self._shipped[found.class_ids]
         return Found(found.boxes_xyxy, scores, found.class_ids.astype(np.int64))
 

@@ -17,7 +17,7 @@ from mcap_landmarks.messages.images import CompressedImage
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.runs.pipeline import run_stages
 from mcap_landmarks.runs.plan import Request
-from mcap_landmarks.vision.letterbox import fit, tensor
+from mcap_landmarks.vision.letterbox import Colours, fit, tensor
 from mcap_landmarks.vision.pixels import rgb_from_message
 from mcap_landmarks.vision.session import open_session
 from numpy.typing import NDArray
@@ -46,7 +46,7 @@ def _throughput(folder: Path, rounds: int) -> Iterator[Row]:
     with open_recording(log) as recording:
         for raw in recording.messages(recording.connections(CAMERA_IMAGE.topic)):
             rgb = rgb_from_message(decode(CompressedImage, raw.data))
-            tensors.append(tensor(rgb, fit(INPUT_PX, INPUT_PX), INPUT_PX, np.dtype(np.float32)))
+            tensors.append(tensor(rgb, fit(INPUT_PX, INPUT_PX), INPUT_PX, np.dtype(np.float32), Colours()))
     for name, threads in (("throughput", 0), ("throughput_1_thread", 1)):
         yield _against_bare(name, threads, (resources.detector(), log, folder / "out.mcap"), tensors, rounds)
 

@@ -1,5 +1,6 @@
 """A small log with images, scans and odometry, and what counts how often the detector looks."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import cv2
@@ -12,7 +13,7 @@ from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.stage import Stamped
-from mcap_landmarks.vision.session import Session
+from mcap_landmarks.vision.session import NO_CONSTANTS, Session
 
 from tests.vision.networks import answering
 
@@ -78,9 +79,11 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     looks: list[int] = []
     run = Session.run
 
-    def counting(self: Session, array: np.ndarray) -> list[np.ndarray]:
+    def counting(
+        self: Session, array: np.ndarray, constants: Mapping[str, np.ndarray] = NO_CONSTANTS
+    ) -> list[np.ndarray]:
         looks.append(1)
-        return run(self, array)
+        return run(self, array, constants)
 
     monkeypatch.setattr(Session, "run", counting)
     return looks

@@ -1,9 +1,7 @@
 """Detection stage: rules, order, losses and the second stage, with networks that answer with constants."""
 
-import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
@@ -16,10 +14,8 @@ from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CompressedImage, Image
 from mcap_landmarks.stage import Bundle, Omission, Stamped
 from mcap_landmarks.stages import detect
-from mcap_landmarks.stages.detect import DetectConfig, input_size, process, thresholds
-from mcap_landmarks.vision.contract import read_contract
-from mcap_landmarks.vision.prefetch import AHEAD, in_order
-from mcap_landmarks.vision.session import open_session
+from mcap_landmarks.stages.detect import process
+from mcap_landmarks.vision.config import DetectConfig
 
 from tests.vision.networks import NO_METADATA, Export, answering, averaging, yolov5
 
@@ -124,20 +120,6 @@ def test_the_thesis_has_no_choices(tmp_path: Path) -> None:
         run({"model": network(tmp_path)}, method="thesis")
 
 
-def test_input_sizes(tmp_path: Path) -> None:
-    def size(sides: tuple[Any, Any], image: tuple[int, int], **settings: object) -> tuple[int, int]:
-        yolov5(tmp_path / "m.onnx", ["a"], export=Export(*sides))
-        contract = read_contract(open_session(tmp_path / "m.onnx", threads=1), None, "yolov5")
-        return input_size(contract, image, stage_config(DetectConfig, "detect", settings))
-
-    assert size(("h", "w"), (480, 640)) == (480, 640)
-    assert size(("h", "w"), (480, 640), shape="square") == (640, 640)
-    assert size(("h", "w"), (480, 640), size_px=320) == (256, 320)
-    assert size(("h", "w"), (480, 640), size_px=330, shape="square") == (352, 352)
-    assert size((64, 96), (480, 640)) == (64, 96)
-    assert size((480, "w"), (480, 640)) == (480, 640)
-
-
 def test_classes_that_the_model_does_not_know(tmp_path: Path) -> None:
     resources = {"model": network(tmp_path)}
     with pytest.raises(UsageError, match="detects no persn; did you mean person"):
@@ -146,11 +128,6 @@ def test_classes_that_the_model_does_not_know(tmp_path: Path) -> None:
         run(resources, class_confidence={"zebra": 0.5})
     with pytest.raises(UsageError, match="confidence"):
         run(resources, confidence=1.5)
-
-
-def test_what_is_not_asked_for_has_no_threshold(tmp_path: Path) -> None:
-    contract = read_contract(open_session(network(tmp_path), threads=1), None, "yolov5")
-    assert thresholds(contract, DetectConfig(classes=("car",))).tolist() == [np.inf, 0.25, np.inf]
 
 
 def test_an_image_that_cannot_be_read_is_one_loss(tmp_path: Path) -> None:
@@ -181,42 +158,6 @@ def test_results_come_in_the_order_of_the_images(tmp_path: Path) -> None:
         assert isinstance(single, Stamped)
         assert isinstance(single.message, Detections)
         np.testing.assert_array_equal(message.boxes_xyxy, single.message.boxes_xyxy)
-
-
-def test_steps_overlap_and_memory_is_bounded() -> None:
-    drawn, both = 0, threading.Barrier(2, timeout=10)
-
-    def items() -> Iterator[int]:
-        nonlocal drawn
-        for i in range(20):
-            drawn += 1
-            yield i
-
-    def prepare(item: int) -> int:
-        if item == 1:
-            both.wait()
-        return item
-
-    def work(item: int) -> int:
-        if item == 0:
-            both.wait()  # only if 1 is being prepared while 0 is worked on
-        return -item
-
-    for position, (item, result) in enumerate(in_order(items(), prepare, work, at_once=2)):
-        assert (item, result) == (position, -position)
-        assert drawn <= position + 2 + AHEAD + 1
-
-
-def test_errors_in_a_thread_come_out() -> None:
-    def fail(item: int) -> int:
-        if item == 3:
-            raise RecordingError("three")
-        return item
-
-    stream = in_order(range(6), fail, lambda item: item)
-    assert [next(stream)[1] for _ in range(3)] == [0, 1, 2]
-    with pytest.raises(RecordingError, match="three"):
-        next(stream)
 
 
 def classifier(folder: Path, shares: list[float], metadata: Mapping[str, str] = NAMES) -> Path:

@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import onnx
-from mcap_landmarks.vision.contract import ANCHORS
+from mcap_landmarks.vision.families.yolov5 import ANCHORS, Form
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 from onnx import TensorProto, helper, numpy_helper
 
@@ -18,7 +18,6 @@ COCO_PARAMETERS = {"n": 1_867_405, "s": 7_225_885, "m": 21_172_173, "l": 46_533_
 STRIDES = (8, 16, 32)
 NO_METADATA: Mapping[str, str] = {}
 
-Form = Literal["decoded", "heads", "planes"]
 Side = int | str
 
 

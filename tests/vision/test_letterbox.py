@@ -1,9 +1,10 @@
 """Letterboxes: where pixels go, and how boxes come back."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from mcap_landmarks.vision.letterbox import fit, fitted_input, tensor
+from mcap_landmarks.vision.letterbox import Colours, fit, fitted_input, tensor
 
 sides = st.integers(2, 2000)
 
@@ -46,7 +47,7 @@ def test_the_tensor_has_the_image_in_grey_margins() -> None:
     rng = np.random.default_rng(0)
     image = rng.integers(0, 256, (48, 64, 3), dtype=np.uint8)
     box = fit((48, 64), (64, 64))
-    found = tensor(image, box, (64, 64), np.dtype(np.float32))
+    found = tensor(image, box, (64, 64), np.dtype(np.float32), Colours())
     assert found.shape == (1, 3, 64, 64)
     assert found.dtype == np.float32
     np.testing.assert_allclose(found[0, :, 8:56], image.transpose(2, 0, 1) / 255, atol=1e-7)
@@ -56,7 +57,7 @@ def test_the_tensor_has_the_image_in_grey_margins() -> None:
 
 def test_half_precision() -> None:
     image = np.full((64, 64, 3), 51, np.uint8)
-    found = tensor(image, fit((64, 64), (64, 64)), (64, 64), np.dtype(np.float16))
+    found = tensor(image, fit((64, 64), (64, 64)), (64, 64), np.dtype(np.float16), Colours())
     assert found.dtype == np.float16
     assert np.unique(found).tolist() == [np.float16(0.2)]
 
@@ -64,7 +65,19 @@ def test_half_precision() -> None:
 def test_an_image_is_scaled() -> None:
     image = np.zeros((20, 20, 3), np.uint8)
     image[:, 10:, 0] = 255
-    found = tensor(image, fit((20, 20), (64, 64)), (64, 64), np.dtype(np.float32))
+    found = tensor(image, fit((20, 20), (64, 64)), (64, 64), np.dtype(np.float32), Colours())
     assert found[0, 0, :, :28].max() == 0
     assert found[0, 0, :, 36:].min() == 1
     assert found[0, 1:].max() == 0
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float16])
+def test_colours_in_another_order_less_a_mean(dtype: type[np.floating]) -> None:
+    image = np.tile(np.array([200, 100, 50], np.uint8), (32, 64, 1))
+    blue_first = Colours("bgr", (103.53, 116.28, 123.675), (57.375, 57.12, 58.395), padding=0)
+    found = tensor(image, fit((32, 64), (64, 64)), (64, 64), np.dtype(dtype), blue_first)
+    assert found.dtype == dtype
+    exact = np.finfo(dtype).eps * 2
+    for channel, (value, mean, std) in enumerate(zip((50, 100, 200), blue_first.mean, blue_first.std, strict=True)):
+        np.testing.assert_allclose(found[0, channel, 16:48], (value - mean) / std, rtol=exact)
+        np.testing.assert_allclose(found[0, channel, :16], -mean / std, rtol=exact)

@@ -8,7 +8,8 @@ import pytest
 torch = pytest.importorskip("torch")
 onnx = pytest.importorskip("onnx")
 import onnxruntime  # noqa: E402 - after what may skip
-from mcap_landmarks.vision.contract import read_contract  # noqa: E402
+from mcap_landmarks.vision.config import DetectConfig  # noqa: E402
+from mcap_landmarks.vision.detector import read_detector  # noqa: E402
 from mcap_landmarks.vision.session import open_session  # noqa: E402
 from mcap_landmarks_generator.training import fitting  # noqa: E402
 from mcap_landmarks_generator.training.coco import NAMES  # noqa: E402
@@ -109,10 +110,10 @@ def test_the_loss_is_small_for_what_is_right_and_has_a_gradient() -> None:
 def test_an_export_says_what_the_network_says_under_cocos_names(tmp_path: Path) -> None:
     network, path = _trained_a_little(), tmp_path / "model.onnx"
     export(network, path, None, {"confidence": "0.4", "commit": "abc"})
-    contract = read_contract(open_session(path), None, "yolov5")
-    assert contract.names == NAMES
-    assert contract.input_px == (None, None)
-    assert set(contract.confidence.values()) == {0.4}
+    detector = read_detector(open_session(path), None, DetectConfig())
+    assert detector.names == NAMES
+    assert detector.layout.input_px == (None, None)
+    assert set(detector.confidence.values()) == {0.4}
     image = torch.rand(1, 3, 96, 128)
     (rows,) = open_session(path).run(image.numpy())
     with torch.no_grad():

@@ -1,1 +1,1 @@
-"""Pixels and boxes: images to RGB, letterbox, the YOLOv5 contract, decoding, NMS, and the ONNX session."""
+"""Pixels and boxes: images to RGB, letterbox, detector families, NMS, and the ONNX session."""

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import ModelError
-from mcap_landmarks.vision.contract import fits, names_of
+from mcap_landmarks.vision.metadata import names_of
 from mcap_landmarks.vision.pixels import Rgb
-from mcap_landmarks.vision.session import Provider, Session, open_session
+from mcap_landmarks.vision.session import FLOATS, Provider, Session, fits, open_session
 
-_DTYPES = {"float": np.float32, "float16": np.float16}
 _USUAL_SIDE_PX = 224
 _WIDER, _MARGIN_PX = 1.3, 30.0
 
@@ -33,7 +32,7 @@ class Classifier:
         for i, box in enumerate(boxes_xyxy):
             part = cv2.resize(_part(image, box), self.input_px[::-1], interpolation=cv2.INTER_LINEAR)
             colours = (part / np.float32(255) - np.array(self.mean, np.float32)) / np.array(self.std, np.float32)
-            array = np.ascontiguousarray(colours.transpose(2, 0, 1)[None], _DTYPES[self.session.inputs[0].dtype])
+            array = np.ascontiguousarray(colours.transpose(2, 0, 1)[None], FLOATS[self.session.inputs[0].dtype])
             output = self.session.run(array)[0]
             if output.shape != (1, len(self.names)):
                 raise ModelError(
@@ -59,7 +58,7 @@ def open_classifier(
     session = open_session(path, provider, threads)
     inputs, outputs = session.inputs, session.outputs
     usable = len(inputs) == len(outputs) == 1 and fits(inputs[0].shape, (1, 3, None, None))
-    if not usable or inputs[0].dtype not in _DTYPES or not fits(outputs[0].shape, (1, None)):
+    if not usable or inputs[0].dtype not in FLOATS or not fits(outputs[0].shape, (1, None)):
         raise ModelError(
             f"{path}: not an image classifier: found input {', '.join(map(str, inputs))} and output "
             f"{', '.join(map(str, outputs))}; expected input [1, 3, ?, ?] float or float16 and output [1, ?]"

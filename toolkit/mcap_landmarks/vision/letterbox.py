@@ -1,6 +1,7 @@
 """Letterbox: an image scaled into a network's input with its sides kept in proportion, and boxes taken back."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -8,11 +9,21 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.vision.pixels import Rgb
 
-GREY = 114
-"""What YOLOv5 pads with, of 255."""
-
 Boxes = NDArray[np.float32]
 """Boxes (N, 4): left, top, right, bottom in pixels."""
+
+
+@dataclass(frozen=True, slots=True)
+class Colours:
+    """How a network sees an image: per channel, in its own `order`, (value - mean) / std of values of 0 to 255.
+
+    The margins beside the image have the value `padding`. The defaults are those of YOLOv5 and its descendants.
+    """
+
+    order: Literal["rgb", "bgr"] = "rgb"
+    mean: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    std: tuple[float, float, float] = (255.0, 255.0, 255.0)
+    padding: float = 114.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +47,7 @@ class Letterbox:
 
 
 def fit(image_px: tuple[int, int], input_px: tuple[int, int]) -> Letterbox:
-    """The letterbox of an image (height, width) in an input (height, width), centred as YOLOv5 does."""
+    """The letterbox of an image (height, width) in the middle of an input (height, width)."""
     (image_height, image_width), (height, width) = image_px, input_px
     sizes = [
         (max(1, round(image_height * ratio)), max(1, round(image_width * ratio)))
@@ -55,15 +66,24 @@ def fitted_input(image_px: tuple[int, int], size_px: int, stride_px: int) -> tup
     return height, width
 
 
-def tensor(image: Rgb, box: Letterbox, input_px: tuple[int, int], dtype: np.dtype[np.floating]) -> NDArray[np.floating]:
-    """The network's input (1, 3, height, width), 0 to 1, of an image in its letterbox."""
+def tensor(
+    image: Rgb, box: Letterbox, input_px: tuple[int, int], dtype: np.dtype[np.floating], colours: Colours
+) -> NDArray[np.floating]:
+    """The network's input (1, 3, height, width) of an image in its letterbox."""
     scaled = image
     if image.shape[:2] != (box.height_px, box.width_px):
         scaled = np.asarray(cv2.resize(image, (box.width_px, box.height_px), interpolation=cv2.INTER_LINEAR), np.uint8)
-    shares = np.empty((1, 3, *input_px), dtype)
-    if (box.height_px, box.width_px) != input_px:
-        shares.fill(GREY / 255)
-    inner = shares[0, :, box.top_px : box.top_px + box.height_px, box.left_px : box.left_px + box.width_px]
-    for channel, plane in enumerate(cv2.split(scaled)):  # plane by plane is three times as fast as a transposed copy
-        np.multiply(plane, np.float32(1 / 255), out=inner[channel], dtype=np.float32, casting="same_kind")
-    return shares
+    whole = np.empty((1, 3, *input_px), dtype)
+    rows = slice(box.top_px, box.top_px + box.height_px)
+    columns = slice(box.left_px, box.left_px + box.width_px)
+    planes = cv2.split(scaled)  # plane by plane is three times as fast as a transposed copy
+    ordered = planes if colours.order == "rgb" else planes[::-1]
+    for channel, (plane, mean, std) in enumerate(zip(ordered, colours.mean, colours.std, strict=True)):
+        if (box.height_px, box.width_px) != input_px:
+            whole[0, channel].fill((colours.padding - mean) / std)
+        inner = whole[0, channel, rows, columns]
+        if mean == 0:
+            np.multiply(plane, np.float32(1 / std), out=inner, dtype=np.float32, casting="same_kind")
+        else:
+            inner[:] = (plane - np.float32(mean)) * np.float32(1 / std)
+    return whole

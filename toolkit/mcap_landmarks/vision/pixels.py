@@ -19,7 +19,7 @@ _TRAILER_BYTES = 1024  # some cameras pad a JPEG after its end
 
 
 @dataclass(frozen=True, slots=True)
-class _Layout:
+class _Encoding:
     """How an encoding lies in memory: samples per pixel, bytes per sample, and OpenCV's conversion (None: RGB already).
 
     `rows` per image row is above 1 where a second plane follows the first.
@@ -31,36 +31,36 @@ class _Layout:
     rows: float = 1.0
 
 
-def _family(bits: int) -> dict[str, _Layout]:
+def _of_bits(bits: int) -> dict[str, _Encoding]:
     size = bits // 8
     return {
-        f"rgb{bits}": _Layout(3, size, None),
-        f"rgba{bits}": _Layout(4, size, cv2.COLOR_RGBA2RGB),
-        f"bgr{bits}": _Layout(3, size, cv2.COLOR_BGR2RGB),
-        f"bgra{bits}": _Layout(4, size, cv2.COLOR_BGRA2RGB),
-        f"mono{bits}": _Layout(1, size, cv2.COLOR_GRAY2RGB),
-        f"{bits}UC1": _Layout(1, size, cv2.COLOR_GRAY2RGB),
-        f"{bits}UC3": _Layout(3, size, cv2.COLOR_BGR2RGB),
-        f"{bits}UC4": _Layout(4, size, cv2.COLOR_BGRA2RGB),
-        f"bayer_rggb{bits}": _Layout(1, size, cv2.COLOR_BayerRGGB2RGB),
-        f"bayer_bggr{bits}": _Layout(1, size, cv2.COLOR_BayerBGGR2RGB),
-        f"bayer_gbrg{bits}": _Layout(1, size, cv2.COLOR_BayerGBRG2RGB),
-        f"bayer_grbg{bits}": _Layout(1, size, cv2.COLOR_BayerGRBG2RGB),
+        f"rgb{bits}": _Encoding(3, size, None),
+        f"rgba{bits}": _Encoding(4, size, cv2.COLOR_RGBA2RGB),
+        f"bgr{bits}": _Encoding(3, size, cv2.COLOR_BGR2RGB),
+        f"bgra{bits}": _Encoding(4, size, cv2.COLOR_BGRA2RGB),
+        f"mono{bits}": _Encoding(1, size, cv2.COLOR_GRAY2RGB),
+        f"{bits}UC1": _Encoding(1, size, cv2.COLOR_GRAY2RGB),
+        f"{bits}UC3": _Encoding(3, size, cv2.COLOR_BGR2RGB),
+        f"{bits}UC4": _Encoding(4, size, cv2.COLOR_BGRA2RGB),
+        f"bayer_rggb{bits}": _Encoding(1, size, cv2.COLOR_BayerRGGB2RGB),
+        f"bayer_bggr{bits}": _Encoding(1, size, cv2.COLOR_BayerBGGR2RGB),
+        f"bayer_gbrg{bits}": _Encoding(1, size, cv2.COLOR_BayerGBRG2RGB),
+        f"bayer_grbg{bits}": _Encoding(1, size, cv2.COLOR_BayerGRBG2RGB),
     }
 
 
-_LAYOUTS: Mapping[str, _Layout] = {
-    **_family(8),
-    **_family(16),
-    "yuv422": _Layout(2, 1, cv2.COLOR_YUV2RGB_UYVY),
-    "uyvy": _Layout(2, 1, cv2.COLOR_YUV2RGB_UYVY),
-    "yuv422_yuy2": _Layout(2, 1, cv2.COLOR_YUV2RGB_YUYV),
-    "yuyv": _Layout(2, 1, cv2.COLOR_YUV2RGB_YUYV),
-    "nv12": _Layout(1, 1, cv2.COLOR_YUV2RGB_NV12, rows=1.5),
-    "nv21": _Layout(1, 1, cv2.COLOR_YUV2RGB_NV21, rows=1.5),
-    "nv24": _Layout(1, 1, cv2.COLOR_YUV2RGB_NV12, rows=3.0),
+_ENCODINGS: Mapping[str, _Encoding] = {
+    **_of_bits(8),
+    **_of_bits(16),
+    "yuv422": _Encoding(2, 1, cv2.COLOR_YUV2RGB_UYVY),
+    "uyvy": _Encoding(2, 1, cv2.COLOR_YUV2RGB_UYVY),
+    "yuv422_yuy2": _Encoding(2, 1, cv2.COLOR_YUV2RGB_YUYV),
+    "yuyv": _Encoding(2, 1, cv2.COLOR_YUV2RGB_YUYV),
+    "nv12": _Encoding(1, 1, cv2.COLOR_YUV2RGB_NV12, rows=1.5),
+    "nv21": _Encoding(1, 1, cv2.COLOR_YUV2RGB_NV21, rows=1.5),
+    "nv24": _Encoding(1, 1, cv2.COLOR_YUV2RGB_NV12, rows=3.0),
 }
-ENCODINGS = tuple(sorted(_LAYOUTS))
+ENCODINGS = tuple(sorted(_ENCODINGS))
 """The encodings of `sensor_msgs/Image` that can be read; generic ones (`8UC3`) count as OpenCV's BGR."""
 
 
@@ -68,7 +68,7 @@ def rgb_from_message(message: Image | CompressedImage) -> Rgb:
     """The picture of a message.
 
     Raises:
-        MessageError: the data are damaged or cut short, or of a kind that is no colour or grey picture.
+        MessageError: the data are damaged or cut short, or no colour or grey picture.
     """
     try:
         return _from_file(message) if isinstance(message, CompressedImage) else _from_rows(message)
@@ -92,22 +92,22 @@ def _from_file(message: CompressedImage) -> Rgb:
 
 
 def _from_rows(message: Image) -> Rgb:
-    layout = _LAYOUTS.get(message.encoding)
-    if layout is None:
+    encoding = _ENCODINGS.get(message.encoding)
+    if encoding is None:
         raise MessageError(f"encoding {message.encoding!r} is no picture; readable are {', '.join(ENCODINGS)}")
-    samples = _samples(message, layout)
+    samples = _samples(message, encoding)
     if message.encoding == "nv24":
         samples = _nv12_from_nv24(samples, message.height_px)
-    if layout.conversion is not None:
-        samples = cv2.cvtColor(samples, layout.conversion)
+    if encoding.conversion is not None:
+        samples = cv2.cvtColor(samples, encoding.conversion)
     if samples.dtype == np.uint16:
         samples = cv2.convertScaleAbs(samples, alpha=255 / 65535)
     return np.ascontiguousarray(samples, np.uint8)
 
 
-def _samples(message: Image, layout: _Layout) -> NDArray[Any]:
+def _samples(message: Image, encoding: _Encoding) -> NDArray[Any]:
     """The samples (rows, width) or (rows, width, channels) without the padding at the ends of rows."""
-    used, rows = message.width_px * layout.channels * layout.sample_bytes, int(message.height_px * layout.rows)
+    used, rows = message.width_px * encoding.channels * encoding.sample_bytes, int(message.height_px * encoding.rows)
     step = message.step or used
     if not (rows and used) or step < used or len(message.data) < step * (rows - 1) + used:
         raise MessageError(
@@ -115,12 +115,12 @@ def _samples(message: Image, layout: _Layout) -> NDArray[Any]:
             f"with rows of {message.step} bytes"
         )
     lines = np.lib.stride_tricks.as_strided(np.frombuffer(message.data, np.uint8), (rows, used), (step, 1))
-    if layout.sample_bytes == 1:
+    if encoding.sample_bytes == 1:
         samples = np.ascontiguousarray(lines)
     else:
-        kind = np.dtype(np.uint16).newbyteorder(">" if message.is_bigendian else "<")
-        samples = np.ascontiguousarray(lines).view(kind).astype(np.uint16)
-    return samples if layout.channels == 1 else samples.reshape(rows, message.width_px, layout.channels)
+        sample = np.dtype(np.uint16).newbyteorder(">" if message.is_bigendian else "<")
+        samples = np.ascontiguousarray(lines).view(sample).astype(np.uint16)
+    return samples if encoding.channels == 1 else samples.reshape(rows, message.width_px, encoding.channels)
 
 
 def _nv12_from_nv24(samples: NDArray[Any], height_px: int) -> NDArray[Any]:

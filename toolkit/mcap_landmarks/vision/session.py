@@ -21,7 +21,10 @@ _FAILURES = (
     *(state.Fail, state.InvalidArgument, state.NoSuchFile, state.NoModel, state.RuntimeException, state.EPFail),
     *(state.InvalidProtobuf, state.NotImplemented, state.InvalidGraph, RuntimeError, ValueError),
 )
-_ERRORS_ONLY = 3
+_ERRORS_ONLY = 3  # onnxruntime's severity: 0 is verbose, 4 is fatal
+FLOATS: Mapping[str, np.dtype[np.floating]] = {"float": np.dtype(np.float32), "float16": np.dtype(np.float16)}
+"""The types of an input that takes images, by the names that ONNX gives them."""
+NO_CONSTANTS: Mapping[str, NDArray[Any]] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +44,12 @@ def written(shape: Sequence[int | None]) -> str:
     return "[" + ", ".join("?" if length is None else str(length) for length in shape) + "]"
 
 
+def fits(found: Sequence[int | None], expected: Shape) -> bool:
+    """Whether two shapes agree wherever both are known."""
+    pairs = zip(found, expected, strict=False)
+    return len(found) == len(expected) and all(a == b or a is None or b is None for a, b in pairs)
+
+
 class Session:
     """A loaded ONNX file; made by `open_session`. It may be run from several threads."""
 
@@ -51,14 +60,14 @@ class Session:
         self.metadata: Mapping[str, str] = session.get_modelmeta().custom_metadata_map
         self._session = session
 
-    def run(self, array: NDArray[Any]) -> list[NDArray[Any]]:
-        """The outputs for the one input.
+    def run(self, array: NDArray[Any], constants: Mapping[str, NDArray[Any]] = NO_CONSTANTS) -> list[NDArray[Any]]:
+        """The outputs for the first input, with `constants` for the others by name.
 
         Raises:
             ModelError: the model cannot take this input.
         """
         try:
-            return [np.asarray(output) for output in self._session.run(None, {self.inputs[0].name: array})]
+            return [np.asarray(output) for output in self._session.run(None, {self.inputs[0].name: array, **constants})]
         except _FAILURES as error:
             shape = written(array.shape)
             raise ModelError(

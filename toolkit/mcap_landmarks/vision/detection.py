@@ -1,0 +1,95 @@
+"""One image through a detector: into its input, and its outputs to boxes in the image."""
+
+import difflib
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.errors import UsageError
+from mcap_landmarks.vision.config import USUAL_CONFIDENCE, DetectConfig
+from mcap_landmarks.vision.detector import Detector
+from mcap_landmarks.vision.letterbox import Letterbox, fitted_input, tensor
+from mcap_landmarks.vision.nms import suppress
+from mcap_landmarks.vision.pixels import Rgb
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prepared:
+    """An image (H, W, 3) on its way through a network: where it lies in the input (1, 3, height, width)."""
+
+    rgb: Rgb
+    letterbox: Letterbox
+    array: NDArray[np.floating]
+
+    @property
+    def input_px(self) -> tuple[int, int]:
+        """Height and width of the input."""
+        height, width = self.array.shape[2:]
+        return height, width
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """N boxes in pixels of the original image: boxes_xyxy (N, 4), scores (N,), class_ids (N,), best first."""
+
+    boxes_xyxy: NDArray[np.float64]
+    scores: NDArray[np.float32]
+    class_ids: NDArray[np.intp]
+
+
+def thresholds(detector: Detector, config: DetectConfig) -> NDArray[np.float32]:
+    """The threshold of every class (classes,), infinite for those that are not asked for.
+
+    Raises:
+        UsageError: the configuration names a class that the model does not know.
+    """
+    for name in (*config.classes, *config.class_confidence):
+        if name not in detector.names:
+            near = difflib.get_close_matches(name, detector.names, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"it knows {', '.join(detector.names)}"
+            raise UsageError(f"{detector.path} detects no {name}; {hint}")
+    own = detector.confidence if config.confidence is None else {}
+    usual = USUAL_CONFIDENCE if config.confidence is None else config.confidence
+    by_class = {**dict.fromkeys(detector.names, usual), **own, **config.class_confidence}
+    wanted = config.classes or detector.names
+    return np.array([by_class[name] if name in wanted else np.inf for name in detector.names], dtype=np.float32)
+
+
+def input_size(detector: Detector, image_px: tuple[int, int], config: DetectConfig) -> tuple[int, int]:
+    """The input (height, width) for an image (height, width): the model's, and as configured where that is free."""
+    sides = image_px if config.shape == "fitted" else (1, 1)
+    height, width = fitted_input(sides, config.size_px, detector.layout.stride_px)
+    return detector.layout.input_px[0] or height, detector.layout.input_px[1] or width
+
+
+def prepare(rgb: Rgb, detector: Detector, config: DetectConfig) -> Prepared:
+    """An image as the detector takes it."""
+    height, width = rgb.shape[:2]
+    input_px = input_size(detector, (height, width), config)
+    letterbox = detector.family.place((height, width), input_px)
+    return Prepared(rgb, letterbox, tensor(rgb, letterbox, input_px, detector.dtype, detector.family.colours))
+
+
+def find(
+    outputs: list[NDArray[Any]],
+    image: Prepared,
+    detector: Detector,
+    above: NDArray[np.float32],
+    config: DetectConfig,
+) -> Found:
+    """What the network found in one image, of its outputs; `above` are the `thresholds`.
+
+    Raises:
+        ModelError: the outputs have other shapes than those of the model's family.
+    """
+    found = detector.candidates(outputs, image.input_px, above)
+    if detector.family.needs_nms:
+        best = suppress(found.boxes_xyxy, found.scores, found.class_ids, config.iou, config.max_detections)
+    else:
+        best = np.argsort(-found.scores, kind="stable")[: config.max_detections]
+    found = found.take(best)
+    boxes = image.letterbox.in_image(found.boxes_xyxy)
+    seen = (boxes[:, 2:] > boxes[:, :2]).all(axis=1)  # a box in the margins is nothing
+    return Found(boxes[seen], found.scores[seen], found.class_ids[seen])

@@ -1,0 +1,95 @@
+"""The shape of a detector family: how its models are recognised, what they take, and how their outputs become boxes."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.vision.letterbox import Boxes, Colours, Letterbox, fit
+from mcap_landmarks.vision.metadata import literal
+from mcap_landmarks.vision.session import Shape, Tensor
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """N boxes in pixels of the input: boxes_xyxy (N, 4), scores (N,), class_ids (N,)."""
+
+    boxes_xyxy: Boxes
+    scores: NDArray[np.float32]
+    class_ids: NDArray[np.intp]
+
+    def take(self, indices: NDArray[Any]) -> "Candidates":
+        """Some of the boxes."""
+        return Candidates(self.boxes_xyxy[indices], self.scores[indices], self.class_ids[indices])
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """What an ONNX file says of itself: its inputs, outputs and metadata, and the number of classes of its names.
+
+    `assumed` holds values that count where the metadata have none.
+    """
+
+    path: Path
+    inputs: tuple[Tensor, ...]
+    outputs: tuple[Tensor, ...]
+    classes: int
+    metadata: Mapping[str, str] = field(default_factory=dict)
+    assumed: Mapping[str, object] = field(default_factory=dict)
+
+    def value(self, key: str) -> object:
+        """What the metadata say, else what is assumed, else None.
+
+        Raises:
+            ModelError: the metadata's entry cannot be read.
+        """
+        own = literal(self.path, self.metadata, key)
+        return self.assumed.get(key) if own is None else own
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layout(ABC):
+    """The inputs and outputs of one model of a family.
+
+    `input_px` is (height, width), None where free; a free side is chosen in whole `stride_px`. The image is the first
+    input; every other one is a constant by name.
+    """
+
+    input_px: tuple[int | None, int | None]
+    stride_px: int
+    constants: Mapping[str, NDArray[Any]] = field(default_factory=dict, kw_only=True)
+
+    @abstractmethod
+    def outputs(self, input_px: tuple[int, int]) -> tuple[Shape, ...]:
+        """The shapes of the first outputs for an input (height, width), None where a length is free."""
+
+    @abstractmethod
+    def decode(
+        self, outputs: Sequence[NDArray[Any]], input_px: tuple[int, int], thresholds: NDArray[np.float32]
+    ) -> Candidates:
+        """The boxes whose score is above the threshold of their class (classes,), of outputs of the said shapes.
+
+        Boxes and scores that are not finite are left out.
+        """
+
+
+@dataclass(frozen=True, slots=True)
+class Family:
+    """Detectors of one kind of output.
+
+    `title` names them in messages. `recognise` gives the layout of a model of the family; for any other it says, in the
+    words of an error, what the family expects in place of what is there. `needs_nms`: several boxes of one object are
+    to be expected. `place` puts an image (height, width) into an input (height, width), and `colours` says how it is
+    normalised.
+    """
+
+    name: str
+    title: str
+    recognise: Callable[[Signature], Layout | str]
+    needs_nms: bool
+    colours: Colours = field(default_factory=Colours)
+    place: Callable[[tuple[int, int], tuple[int, int]], Letterbox] = fit

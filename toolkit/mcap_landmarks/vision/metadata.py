@@ -1,0 +1,69 @@
+"""What the metadata of an ONNX file say: literals, class names and thresholds."""
+
+import ast
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from mcap_landmarks.errors import ModelError
+from mcap_landmarks.vision.session import Session
+
+
+def literal(path: Path, metadata: Mapping[str, str], key: str) -> object:
+    """The value of one entry, written as in Python; None where there is no such entry.
+
+    Raises:
+        ModelError: the entry is no literal.
+    """
+    text = metadata.get(key)
+    if text is None:
+        return None
+    try:
+        return ast.literal_eval(text)
+    except (ValueError, SyntaxError) as error:
+        raise ModelError(f"{path}: {key} in the metadata is {text[:60]!r}; export the model again") from error
+
+
+def names_of(session: Session, names_file: Path | None) -> tuple[str, ...]:
+    """The class names by class id: lines of a file, else the metadata's `names`.
+
+    Raises:
+        ModelError: there are none.
+    """
+    if names_file is not None:
+        try:
+            lines = names_file.read_text().split("\n")
+        except (OSError, UnicodeDecodeError) as error:
+            raise ModelError(f"{names_file}: not a text file of class names, one per line: {error}") from error
+        names = tuple(line.strip() for line in lines if line.strip())
+    else:
+        found = literal(session.path, session.metadata, "names")
+        found = () if found is None else found
+        if isinstance(found, Mapping):
+            found = [found.get(i) for i in range(len(found))]
+        names = tuple(name for name in found if isinstance(name, str)) if isinstance(found, Sequence) else ()
+        if not isinstance(found, Sequence) or len(names) != len(found):
+            raise ModelError(f"{session.path}: the names in its metadata cannot be read; give --names FILE")
+    if not names:
+        raise ModelError(f"{session.path}: it has no class names in its metadata; give --names FILE, one name per line")
+    return names
+
+
+def confidence_of(session: Session, names: tuple[str, ...]) -> dict[str, float]:
+    """The metadata's `confidence`, one number or a number by class name, as thresholds by class name; empty if none.
+
+    Raises:
+        ModelError: it is neither 0 to 1 nor such numbers by class name.
+    """
+    own = literal(session.path, session.metadata, "confidence")
+    by_class = own if isinstance(own, Mapping) else {} if own is None else dict.fromkeys(names, own)
+    fitting = {
+        name: float(value)
+        for name, value in by_class.items()
+        if name in names and isinstance(value, int | float) and 0 <= value <= 1
+    }
+    if len(fitting) < len(by_class):
+        raise ModelError(
+            f"{session.path}: confidence in its metadata is neither 0 to 1 nor such numbers by its own class names "
+            f"({', '.join(names)}); rename its keys too, or take it out of the metadata and set detect.confidence"
+        )
+    return fitting
