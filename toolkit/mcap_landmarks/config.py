@@ -7,12 +7,12 @@ import json
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
 from mcap_landmarks.errors import ToolkitError, UsageError
+from mcap_landmarks.locations import Location, location, to_read
 from mcap_landmarks.sources import find_source, source_names
 from mcap_landmarks.stage import Config, Stage
 from mcap_landmarks.stages import find_stage, stage_names
@@ -22,7 +22,7 @@ Settings = dict[str, dict[str, object]]
 """What the user set: value by key, by stage or source. What is not set has the default of the dataclass."""
 
 
-def gather(file: Path | None, settings: Sequence[str], method: str | None) -> Settings:
+def gather(file: Location | None, settings: Sequence[str], method: str | None) -> Settings:
     """Settings by stage or source from a TOML file, then `STAGE.KEY=VALUE` texts over it.
 
     `method` counts for every stage.
@@ -63,9 +63,9 @@ _WORDS = {"tuple_type": 'give a list, such as ["person", "suitcase"] or [0.1, 0.
 """What pydantic says in terms of Python, in terms of TOML."""
 
 
-def _from_file(path: Path) -> Settings:
+def _from_file(path: Location) -> Settings:
     try:
-        tables = tomllib.loads(path.read_text())
+        tables = tomllib.loads(to_read(path).read_text())
     except FileNotFoundError as error:
         raise UsageError(f"{path}: there is no such configuration file; check the path") from error
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
@@ -135,7 +135,9 @@ def effective(config: Config) -> dict[str, object]:
     return dataclasses.asdict(config)
 
 
-def load_files(stage: Stage, settings: Settings, given: Mapping[str, Path | None]) -> tuple[Config, dict[str, Path]]:
+def load_files(
+    stage: Stage, settings: Settings, given: Mapping[str, Location | None]
+) -> tuple[Config, dict[str, Location]]:
     """The configuration of a stage, and its files: `given` ones, else those that the settings name, such as
     `detect.model`. Files are no part of the configuration, so that no path gets into a manifest.
 
@@ -143,7 +145,7 @@ def load_files(stage: Stage, settings: Settings, given: Mapping[str, Path | None
         UsageError: a file that the stage cannot do without is not given.
     """
     own = dict(settings.get(stage.name, {}))
-    files = {name: Path(str(own.pop(name))) for name in stage.files if name in own}
+    files = {name: location(str(own.pop(name))) for name in stage.files if name in own}
     files.update({name: path for name, path in given.items() if path is not None and name in stage.files})
     for name in stage.resources:
         if name not in files:
@@ -151,7 +153,7 @@ def load_files(stage: Stage, settings: Settings, given: Mapping[str, Path | None
     return stage_config(stage.config, stage.name, own), files
 
 
-def _bundled(stage: Stage, name: str) -> Path:
+def _bundled(stage: Stage, name: str) -> Location:
     """The file that travels with the program, where the user gives none."""
     if name in stage.bundled:
         with contextlib.suppress(ToolkitError):

@@ -11,6 +11,7 @@ from typing import TypedDict
 
 from mcap_landmarks import __version__
 from mcap_landmarks.errors import ToolkitError
+from mcap_landmarks.locations import Location
 
 RUN = "mcap-landmarks.run"
 """Name of the metadata record that holds the manifest."""
@@ -229,7 +230,7 @@ def text_hash(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def file_hash(path: Path, progress: Callable[[int], None] | None = None) -> str:
+def file_hash(path: Location, progress: Callable[[int], None] | None = None) -> str:
     """SHA-256 of a file's content; `progress` is told the bytes that were read.
 
     Raises:

@@ -3,7 +3,6 @@
 import json
 import tomllib
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,6 +11,7 @@ from mcap_landmarks.channels import BASE_FRAME, MAP_FRAME, ODOM_FRAME, TF_STATIC
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.geometry.frames import FrameTree, plain, rigid
 from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.locations import Location, to_read
 from mcap_landmarks.messages.transforms import TFMessage
 from mcap_landmarks.stage import Bundle
 
@@ -24,7 +24,7 @@ _WORLDS = (MAP_FRAME, ODOM_FRAME, "odom_combined", "world", "earth")
 class Mounting:
     """Transforms between the robot's frames, as a bundle's log and the file `extrinsics` tell them; the file wins."""
 
-    def __init__(self, extrinsics: Path | None = None) -> None:
+    def __init__(self, extrinsics: Location | None = None) -> None:
         """Read the file, if there is one.
 
         Raises:
@@ -66,7 +66,7 @@ class Mounting:
         self._seen, self._tree, self._found = message, FrameTree.of([*edges, *self._own]), {}
 
 
-def read_extrinsics(path: Path) -> list[Edge]:
+def read_extrinsics(path: Location) -> list[Edge]:
     """Transforms of a TOML or JSON file: a list `transforms` of `parent`, `child`, `xyz` (m), `rpy` or `quaternion`.
 
     `rpy` are roll, pitch, yaw in rad about the parent's fixed axes, as in a URDF; `quaternion` is x, y, z, w. Without
@@ -82,7 +82,7 @@ def read_extrinsics(path: Path) -> list[Edge]:
         UsageError: the file cannot be read, or an entry is not of this form.
     """
     try:
-        text = path.read_text()
+        text = to_read(path).read_text()
         content = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
         raise UsageError(f"{path}: extrinsics cannot be read: {error}; write TOML or JSON") from error
@@ -92,7 +92,7 @@ def read_extrinsics(path: Path) -> list[Edge]:
     return [_edge(path, number, entry) for number, entry in enumerate(entries, 1)]
 
 
-def _edge(path: Path, number: int, entry: object) -> Edge:
+def _edge(path: Location, number: int, entry: object) -> Edge:
     where = f"{path}: transform {number}"
     known = {"parent", "child", "xyz", "rpy", "quaternion"}
     if not isinstance(entry, Mapping) or not {"parent", "child", "xyz"} <= {*entry} <= known:

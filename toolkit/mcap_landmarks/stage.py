@@ -9,13 +9,13 @@ import contextlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import Field, dataclass, field
-from pathlib import Path
 from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.geometry.se2 import Array, between, exp, interpolate
+from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.codec import M, Message
 
 M_co = TypeVar("M_co", bound=Message, covariant=True)
@@ -77,7 +77,7 @@ class Readable(Protocol):
     """Channels whose messages can be read in the order of time: an open recording is one, and a layered log."""
 
     @property
-    def path(self) -> Path:
+    def path(self) -> Location:
         """Where the log lies, for messages to the user."""
 
     @property
@@ -209,7 +209,7 @@ class LeftOut:
     reason: str
 
 
-Process = Callable[[Iterable[Bundle], Any, Mapping[str, Path]], Iterator[Stamped | Omission]]
+Process = Callable[[Iterable[Bundle], Any, Mapping[str, Location]], Iterator[Stamped | Omission]]
 """Results of bundles, of the stage's configuration (an object of its own dataclass) and of its files by name."""
 
 Place = Callable[[InputLog, Any], str | LeftOut]
@@ -237,7 +237,7 @@ class Stage:
     places: Mapping[Channel[Message], Place] = field(default_factory=dict)
     resources: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
-    bundled: Mapping[str, Callable[[], Path]] = field(default_factory=dict)
+    bundled: Mapping[str, Callable[[], Location]] = field(default_factory=dict)
     tolerance: Mapping[str, float | Tolerance] = field(default_factory=dict)
 
     @property

@@ -5,7 +5,6 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from itertools import islice
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
@@ -14,6 +13,7 @@ from typer.core import TyperCommand, TyperGroup, TyperOption
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import DONE, PARTIAL, UNUSABLE, progress, say, say_json, table, warn
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.batch import Ended, Task
@@ -47,7 +47,9 @@ def command(
         list[str],
         typer.Argument(metavar="GLOB... [OPTIONS OF VERB]", help="Logs, by name or quoted pattern: 'logs/**/*.mcap'."),
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results, named as their logs.")],
+    output: Annotated[
+        Location, typer.Option("-o", "--output", parser=location, help="Folder for the results, named as their logs.")
+    ],
     workers: Annotated[
         int | None, typer.Option("--workers", min=1, help="Logs at a time; as many as cores by default.")
     ] = None,
@@ -78,7 +80,7 @@ def command(
         raise typer.Exit(PARTIAL)
 
 
-def _tasks(verb: str, words: Sequence[str], output: Path) -> "list[Task]":
+def _tasks(verb: str, words: Sequence[str], output: Location) -> "list[Task]":
     """What to run; the options are checked by the verb's own parser before anything runs.
 
     Raises:
@@ -93,9 +95,9 @@ def _tasks(verb: str, words: Sequence[str], output: Path) -> "list[Task]":
         raise UsageError(f"batch {verb}: name the logs, or a quoted pattern such as 'logs/*.mcap'")
     if verb in _DETECTS:
         passed = ["--set", "detect.threads=1", *passed]
-    make_folder(output)
+    folder = make_folder(output)
     tasks = []
-    for log, target in outputs_in(output, find_logs(patterns), _SUFFIX[verb]).items():
+    for log, target in outputs_in(folder, find_logs(patterns), _SUFFIX[verb]).items():
         where = {"map": ["--map", str(target)], "evaluate": []}.get(verb, ["-o", str(target)])
         tasks.append(Task(log, target, (*_CALL, verb, str(log), *where, "--json", *passed)))
     own.make_context(verb, list(tasks[0].command[len(_CALL) + 1 :]))

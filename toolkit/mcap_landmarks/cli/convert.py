@@ -1,12 +1,12 @@
 """Convert bags and data sets to MCAP."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, warn
+from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.conversion import Converted
@@ -15,8 +15,10 @@ if TYPE_CHECKING:
 
 def command(
     inputs: Annotated[
-        list[Path],
-        typer.Argument(metavar="SRC...", help="ROS 1 .bag; ROS 2 folder, .db3 or .mcap; MRCLAM folder or .zip."),
+        list[Location],
+        typer.Argument(
+            metavar="SRC...", parser=location, help="ROS 1 .bag; ROS 2 folder, .db3 or .mcap; MRCLAM folder or .zip."
+        ),
     ],
     output: options.Output,
     topics: Annotated[

@@ -6,11 +6,13 @@ from typing import Annotated
 import typer
 
 from mcap_landmarks.cli.console import say
+from mcap_landmarks.locations import Location, location
 
 
 def command(
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="Folder for the results; created if its parent exists.")
+        Location,
+        typer.Option("-o", "--output", parser=location, help="Folder for the results; created if its parent exists."),
     ] = Path("mcap-landmarks-demo"),
 ) -> None:
     """Build a map of one bundled log, localize another in it, measure the error and draw it.
@@ -23,10 +25,10 @@ def command(
     from mcap_landmarks.resources import resource
     from mcap_landmarks.runs.outputs import make_folder
 
-    make_folder(output)
+    folder = make_folder(output)
     seen, asked = resource("recordings", "demo_map.mcap"), resource("recordings", "demo_localize.mcap")
-    database, mapped, localized = output / "map.db", output / "mapped.mcap", output / "localized.mcap"
-    picture, given = output / "localized.png", (ImageOptions(), ScanOptions(), LogOptions())
+    database, mapped, localized = folder / "map.db", folder / "mapped.mcap", folder / "localized.mcap"
+    picture, given = folder / "localized.png", (ImageOptions(), ScanOptions(), LogOptions())
 
     say(f"$ mcap-landmarks map {seen} --map {database} -o {mapped}")
     build.command([seen], database, *given, output=mapped)

@@ -1,6 +1,5 @@
 """Detect objects in camera images."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -9,13 +8,16 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, table
 from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
+from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.pipeline import LogRun
 
 
 def command(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP) with camera images.")],
+    logs: Annotated[
+        list[Location], typer.Argument(metavar="LOG...", parser=location, help="Recordings (MCAP) with camera images.")
+    ],
     output: options.Output,
     images: ImageOptions,
     given: LogOptions,

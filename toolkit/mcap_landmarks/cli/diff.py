@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -11,6 +10,7 @@ import typer
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import DONE, USAGE, moment, progress, say, say_json, table, warn
 from mcap_landmarks.errors import ToolkitError, UsageError
+from mcap_landmarks.locations import Location, location, size_of
 
 if TYPE_CHECKING:
     from mcap_landmarks.diff.comparison import Diff
@@ -24,8 +24,12 @@ _HASH = re.compile("[0-9a-f]{32,}")
 
 
 def command(
-    baseline: Annotated[Path, typer.Argument(metavar="BASELINE", help="A log with results, or a MAP.db.")],
-    candidate: Annotated[Path, typer.Argument(metavar="CANDIDATE", help="The same of another run.")],
+    baseline: Annotated[
+        Location, typer.Argument(metavar="BASELINE", parser=location, help="A log with results, or a MAP.db.")
+    ],
+    candidate: Annotated[
+        Location, typer.Argument(metavar="CANDIDATE", parser=location, help="The same of another run.")
+    ],
     tolerance: Annotated[
         list[str] | None,
         typer.Option(
@@ -44,7 +48,10 @@ def command(
         ),
     ] = None,
     reference: Annotated[
-        Path | None, typer.Option("--reference", help="Where the truth is, for a side that has none: a log, or .tum.")
+        Location | None,
+        typer.Option(
+            "--reference", parser=location, help="Where the truth is, for a side that has none: a log, or .tum."
+        ),
     ] = None,
     align: Annotated[
         bool, typer.Option("--align", help="Of databases: move the candidate by the one SE(2) that fits best.")
@@ -59,8 +66,8 @@ def command(
     from mcap_landmarks.diff.comparison import diff
     from mcap_landmarks.diff.conditions import parse
 
-    size = sum(path.stat().st_size for path in (baseline, candidate) if path.is_file())
     try:
+        size = size_of(baseline) + size_of(candidate)
         conditions = [parse(text) for text in fail_on or []]
         with progress("compare", size) as advance:
             limits, truth = tolerance or [], reference

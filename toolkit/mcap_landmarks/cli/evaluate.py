@@ -3,13 +3,13 @@
 from collections.abc import Callable
 from enum import StrEnum
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
+from mcap_landmarks.locations import Location, location, size_of
 
 if TYPE_CHECKING:
     from mcap_landmarks.evaluation.metrics import Evaluation, Pairing, Reference, RunResult
@@ -25,7 +25,10 @@ class PoseAssociation(StrEnum):
 
 def command(
     result: Annotated[
-        Path, typer.Argument(metavar="RESULT", help="A log with results, a MAP.db, or results.txt as in Appendix D.")
+        Location,
+        typer.Argument(
+            metavar="RESULT", parser=location, help="A log with results, a MAP.db, or results.txt as in Appendix D."
+        ),
     ],
     align: Annotated[
         bool, typer.Option("--align", help="Move the poses by the one SE(2) that fits them best.")
@@ -37,11 +40,15 @@ def command(
         float, typer.Option("--max-gap", min=0, help="Longest gap of the truth to interpolate over, in seconds.")
     ] = 0.5,
     reference: Annotated[
-        Path | None, typer.Option("--reference", help="Where the truth is: a log, or a trajectory (.tum, .txt).")
+        Location | None,
+        typer.Option("--reference", parser=location, help="Where the truth is: a log, or a trajectory (.tum, .txt)."),
     ] = None,
-    tum: Annotated[Path | None, typer.Option("--tum", help="Write the estimated poses as a TUM trajectory.")] = None,
+    tum: Annotated[
+        Location | None, typer.Option("--tum", parser=location, help="Write the estimated poses as a TUM trajectory.")
+    ] = None,
     thesis: Annotated[
-        Path | None, typer.Option("--thesis", help="Write the scored positions as the thesis's Appendix D.")
+        Location | None,
+        typer.Option("--thesis", parser=location, help="Write the scored positions as the thesis's Appendix D."),
     ] = None,
     json: options.Json = False,
 ) -> None:
@@ -49,10 +56,14 @@ def command(
 
     The truth is RESULT's own /ground_truth channels, or those of --reference.
     """
+    from mcap_landmarks.atomic import check_target
     from mcap_landmarks.evaluation.metrics import evaluate
     from mcap_landmarks.evaluation.read import read_reference, read_run
 
-    with progress(f"read {result.name}", result.stat().st_size if result.is_file() else None) as advance:
+    for target in (tum, thesis):
+        if target is not None:
+            check_target(target)
+    with progress(f"read {result.name}", size_of(result) or None) as advance:
         run, truth, losses = read_run(result, advance)
     if reference is not None:
         other, more = read_reference(reference)
@@ -73,7 +84,7 @@ def command(
         raise typer.Exit(PARTIAL)
 
 
-def _check(result: Path, run: "RunResult", truth: "Reference") -> None:
+def _check(result: Location, run: "RunResult", truth: "Reference") -> None:
     from mcap_landmarks.errors import RecordingError, UsageError
 
     if not run.bundles and not len(run.trajectory) and run.landmarks is None:
@@ -92,7 +103,9 @@ def _pairing(association: PoseAssociation, max_gap_s: float) -> "Pairing":
     return partial(interpolated, max_gap_ns=round(max_gap_s * 1e9))
 
 
-def _export(run: "RunResult", truth: "Reference", pairing: "Pairing", tum: Path | None, thesis: Path | None) -> None:
+def _export(
+    run: "RunResult", truth: "Reference", pairing: "Pairing", tum: Location | None, thesis: Location | None
+) -> None:
     from mcap_landmarks.atomic import atomic_file
     from mcap_landmarks.evaluation.metrics import score
     from mcap_landmarks.evaluation.thesis_results import results_of

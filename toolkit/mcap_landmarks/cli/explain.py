@@ -2,40 +2,45 @@
 
 import math
 from collections import Counter
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, say_json, table
+from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks.evaluation.explain import Place, Situation
 
 
 def command(
-    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A log with results, as localize writes it.")],
+    result: Annotated[
+        Location, typer.Argument(metavar="RESULT", parser=location, help="A log with results, as localize writes it.")
+    ],
     at: Annotated[str, typer.Option("--at", metavar="TIME", help="When: RFC 3339 or integer nanoseconds.")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Draw it, too: image, scan and map (.png, .svg, .pdf).")
+        Location | None,
+        typer.Option("-o", "--output", parser=location, help="Draw it, too: image, scan and map (.png, .svg, .pdf)."),
     ] = None,
     json: options.Json = False,
 ) -> None:
     """Say what was detected, clustered and fused at TIME, which places of the map came into question, and which
     condition of a match held or failed, by how much.
     """
+    from mcap_landmarks.atomic import atomic_file, check_target
     from mcap_landmarks.evaluation.explain import places_of
     from mcap_landmarks.report.explain_reading import read_situation
     from mcap_landmarks.report.plots import form_of
 
     form = form_of(output) if output else ""
+    if output:
+        check_target(output)
     situation, view = read_situation(result, options.time_ns(at, "--at") or 0)
     places = places_of(situation)
     if output:
         from functools import partial
 
-        from mcap_landmarks.atomic import atomic_file
         from mcap_landmarks.report.explain_picture import explanation_figure
         from mcap_landmarks.report.plots import save
 

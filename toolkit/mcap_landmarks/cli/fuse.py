@@ -1,6 +1,5 @@
 """Fuse detections in images with objects in scans."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -9,6 +8,7 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, table
 from mcap_landmarks.cli.option_groups import LogOptions
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
+from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.pipeline import LogRun
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 def command(
     logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP) with detections and scan objects.")
+        list[Location],
+        typer.Argument(metavar="LOG...", parser=location, help="Recordings (MCAP) with detections and scan objects."),
     ],
     output: options.Output,
     given: LogOptions,

@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mcap_landmarks.atomic import check_target
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import progress, say, say_json, table, warn
 from mcap_landmarks.errors import ToolkitError, UsageError
+from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks_generator.checks import Staged
@@ -19,7 +21,9 @@ def command(
     scenario: Annotated[
         str | None, typer.Argument(metavar="SCENARIO", help="Name of a bundled scenario, or a TOML file.")
     ] = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Recording to write (MCAP).")] = None,
+    output: Annotated[
+        Location | None, typer.Option("-o", "--output", parser=location, help="Recording to write (MCAP).")
+    ] = None,
     seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed instead of the scenario's.")] = None,
     settings: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="One value of the scenario; repeatable.")
@@ -41,6 +45,7 @@ def command(
         raise UsageError(
             "name a scenario and where to write: mcap-landmarks generate SCENARIO -o LOG.mcap (see --list)"
         )
+    target = check_target(output)
     try:
         from mcap_landmarks_generator.checks import stage
         from mcap_landmarks_generator.loading import load_scenario
@@ -53,13 +58,13 @@ def command(
     way, factor = staged.scenario.trajectory, staged.scenario.robot.speed_factor
     seconds = round(expected_duration_s(way, staged.start, factor))
     with progress(f"generate {staged.name}", seconds, "simulated s") as advance:
-        summary = record(staged, output, workers or os.cpu_count() or 1, advance)
+        summary = record(staged, target, workers or os.cpu_count() or 1, advance)
     for time_s, name in summary.collisions:
         warn(f"warning: {time_s:.1f} s after the start the robot ran into {name}")
     if json:
-        say_json("generate", _document(staged, output, summary))
+        say_json("generate", _document(staged, target, summary))
     else:
-        _print(output, summary)
+        _print(target, summary)
 
 
 def _list(json: bool) -> None:

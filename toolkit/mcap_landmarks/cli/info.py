@@ -3,20 +3,22 @@
 import dataclasses
 from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, moment, progress, say, say_json, table, warn
+from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks.inspection.info import LogInfo
 
 
 def command(
-    paths: Annotated[list[Path], typer.Argument(metavar="PATH...", help="Recordings (MCAP), bags or data sets.")],
+    paths: Annotated[
+        list[Location], typer.Argument(metavar="PATH...", parser=location, help="Recordings (MCAP), bags or data sets.")
+    ],
     check: Annotated[
         bool, typer.Option("--check", help="Read everything, and tell what will go wrong and what to do about it.")
     ] = False,

@@ -1,12 +1,12 @@
 """Import, export and show landmark databases."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, say_json, table, warn
+from mcap_landmarks.locations import Location, location, to_write
 
 if TYPE_CHECKING:
     from mcap_landmarks.maps.exchange import Format
@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help=__doc__)
 
-Database = Annotated[Path, typer.Argument(metavar="MAP.db", help="Landmark database (SQLite file).")]
+Database = Annotated[
+    Location, typer.Argument(metavar="MAP.db", parser=location, help="Landmark database (SQLite file).")
+]
 Form = Annotated[
     str | None,
     typer.Option("--format", metavar="thesis|csv|json", help="By default what FILE's name says: .txt, .csv, .json."),
@@ -25,7 +27,10 @@ Replace = Annotated[bool, typer.Option("--force", help="Replace an existing file
 @app.command("import")
 def import_file(
     database: Database,
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Landmarks: the thesis's Appendix C, CSV or JSON.")],
+    file: Annotated[
+        Location,
+        typer.Argument(metavar="FILE", parser=location, help="Landmarks: the thesis's Appendix C, CSV or JSON."),
+    ],
     form: Form = None,
     force: Replace = False,
 ) -> None:
@@ -42,7 +47,7 @@ def import_file(
 @app.command("export")
 def export_file(
     database: Database,
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Where to write.")],
+    file: Annotated[Location, typer.Argument(metavar="FILE", parser=location, help="Where to write.")],
     form: Form = None,
     force: Replace = False,
 ) -> None:
@@ -77,7 +82,7 @@ def show(database: Database, json: options.Json = False) -> None:
         _print(database, landmark_map)
 
 
-def _print(database: Path, landmark_map: "LandmarkMap") -> None:
+def _print(database: Location, landmark_map: "LandmarkMap") -> None:
     import numpy as np
 
     say(f"{database}: {_size(landmark_map)} in frame {landmark_map.frame}")
@@ -114,7 +119,7 @@ def _size(landmark_map: "LandmarkMap") -> str:
     )
 
 
-def _format(file: Path, form: str | None) -> "Format":
+def _format(file: Location, form: str | None) -> "Format":
     from mcap_landmarks.errors import UsageError
     from mcap_landmarks.maps.exchange import Format, format_of
 
@@ -126,8 +131,8 @@ def _format(file: Path, form: str | None) -> "Format":
         raise UsageError(f"--format {form}: choose {', '.join(Format)}") from None
 
 
-def _check_new(path: Path, *, force: bool) -> None:
+def _check_new(path: Location, *, force: bool) -> None:
     from mcap_landmarks.errors import UsageError
 
-    if path.exists() and not force:
+    if to_write(path).exists() and not force:
         raise UsageError(f"{path} exists; name another file, or replace it with --force")

@@ -1,7 +1,6 @@
 """Localize logs in a landmark map."""
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,6 +10,7 @@ from mcap_landmarks.cli.console import PARTIAL, moment, progress, say, say_json,
 from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.bundles import Reading
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def command(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP).")],
+    logs: Annotated[list[Location], typer.Argument(metavar="LOG...", parser=location, help="Recordings (MCAP).")],
     map_file: options.MapFile,
     images: ImageOptions,
     scans: ScanOptions,
@@ -72,7 +72,7 @@ def _print(runs: "list[LogRun]") -> None:
         say(f"{run.output}: {localized} bundles localized ({100 * share:.1f} %)")
 
 
-def _at(log: Path, asked_ns: int, given: Given, json: bool) -> None:
+def _at(log: Location, asked_ns: int, given: Given, json: bool) -> None:
     from mcap_landmarks.runs.localize_at import localize_at
 
     answer, reading = localize_at(given.requests([log])[0], asked_ns, progress)
@@ -86,7 +86,7 @@ def _at(log: Path, asked_ns: int, given: Given, json: bool) -> None:
         raise typer.Exit(PARTIAL)
 
 
-def _moment_document(log: Path, asked_ns: int, answer: "Answer", reading: "Reading") -> dict[str, object]:
+def _moment_document(log: Location, asked_ns: int, answer: "Answer", reading: "Reading") -> dict[str, object]:
     match, pose, covariance = answer.match, answer.pose, answer.covariance
     sigma_m, heading_sigma_rad = _sigmas(answer)
     return {
@@ -119,7 +119,7 @@ def _sigmas(answer: "Answer") -> tuple[float | None, float | None]:
     return float(position_sigma(answer.covariance)), math.sqrt(answer.covariance[2, 2])
 
 
-def _print_moment(log: Path, asked_ns: int, answer: "Answer") -> None:
+def _print_moment(log: Location, asked_ns: int, answer: "Answer") -> None:
     match, pose = answer.match, answer.pose
     late_s = (answer.stamp_ns - asked_ns) / 1e9
     say(f"{log} at {moment(answer.stamp_ns)} ({late_s:+.3f} s): {match.status.name.lower()}")

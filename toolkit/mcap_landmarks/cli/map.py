@@ -5,11 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from mcap_landmarks.atomic import check_target
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table
 from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
 from mcap_landmarks.cli.stage_runs import Given, tell, told
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.map_results import MappedLog, MapRun
@@ -17,7 +19,9 @@ if TYPE_CHECKING:
 
 
 def command(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP) with odometry.")],
+    logs: Annotated[
+        list[Location], typer.Argument(metavar="LOG...", parser=location, help="Recordings (MCAP) with odometry.")
+    ],
     map_file: options.MapFile,
     images: ImageOptions,
     scans: ScanOptions,
@@ -26,7 +30,9 @@ def command(
     from_reference: Annotated[
         bool, typer.Option("--from-reference", help="Take the map from LOG's /ground_truth/objects (a surveyed map).")
     ] = False,
-    prior: Annotated[Path | None, typer.Option("--prior", help="Landmark database to extend and refine.")] = None,
+    prior: Annotated[
+        Location | None, typer.Option("--prior", parser=location, help="Landmark database to extend and refine.")
+    ] = None,
     use: options.Use = None,
     extrinsics: options.Extrinsics = None,
 ) -> None:
@@ -34,42 +40,45 @@ def command(
 
     Where a log has no scene objects, they are made first, from images and scans.
     """
+    database = check_target(map_file)
     if from_reference:
-        _from_reference(logs, map_file, given.json)
+        _from_reference(logs, database, given.json)
         return
     asked = Given(given, images, scans, {"extrinsics": extrinsics}, use)
-    run = _build(logs, map_file, prior, output, asked)
+    run = _build(logs, database, prior, output, asked)
     for log in run.logs:
         tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)
     if given.json:
-        say_json("map", _document(run, map_file))
+        say_json("map", _document(run, database))
     else:
-        _print(run, map_file)
+        _print(run, database)
     if any(log.outcome.losses for log in run.logs):
         raise typer.Exit(PARTIAL)
 
 
-def _build(logs: list[Path], map_file: Path, prior: Path | None, output: Path | None, given: Given) -> "MapRun":
+def _build(
+    logs: list[Location], database: Path, prior: Location | None, output: Location | None, given: Given
+) -> "MapRun":
     from mcap_landmarks.runs.build_map import build_map
     from mcap_landmarks.runs.map_plan import MapTask
     from mcap_landmarks.runs.outputs import output_files
 
     targets = output_files(logs, output) if output else {}
-    return build_map(MapTask(tuple(given.requests(logs)), map_file, targets, prior), progress)
+    return build_map(MapTask(tuple(given.requests(logs)), database, targets, prior), progress)
 
 
-def _from_reference(logs: list[Path], map_file: Path, json: bool) -> None:
+def _from_reference(logs: list[Location], database: Path, json: bool) -> None:
     from mcap_landmarks.runs.reference_map import map_from_reference
 
     if len(logs) != 1:
         raise UsageError("--from-reference takes one log; name just that one")
-    landmark_map = map_from_reference(logs[0], map_file)
+    landmark_map = map_from_reference(logs[0], database)
     if json:
         say_json(
-            "map", {"database": str(map_file), "landmarks": len(landmark_map), "tentative": 0, "logs": [], "stages": {}}
+            "map", {"database": str(database), "landmarks": len(landmark_map), "tentative": 0, "logs": [], "stages": {}}
         )
     else:
-        say(f"{map_file}: {len(landmark_map)} surveyed landmarks from {logs[0]}")
+        say(f"{database}: {len(landmark_map)} surveyed landmarks from {logs[0]}")
 
 
 def _stages(run: "MapRun", log: "MappedLog") -> "list[StageRun]":
@@ -79,14 +88,14 @@ def _stages(run: "MapRun", log: "MappedLog") -> "list[StageRun]":
     return [*log.stages, dataclasses.replace(run.build, outcome=log.outcome)]
 
 
-def _document(run: "MapRun", map_file: Path) -> dict[str, object]:
+def _document(run: "MapRun", database: Path) -> dict[str, object]:
     tentative = int(run.landmark_map.tentative.sum())
     states: dict[str, str] = {}
     for log in run.logs:
         for stage in _stages(run, log):
             states[stage.stage] = "ran" if "ran" in {stage.state, states.get(stage.stage)} else "reused"
     return {
-        "database": str(map_file),
+        "database": str(database),
         "landmarks": len(run.landmark_map) - tentative,
         "tentative": tentative,
         "logs": [
@@ -104,9 +113,9 @@ def _document(run: "MapRun", map_file: Path) -> dict[str, object]:
     }
 
 
-def _print(run: "MapRun", map_file: Path) -> None:
+def _print(run: "MapRun", database: Path) -> None:
     tentative = int(run.landmark_map.tentative.sum())
-    say(f"{map_file}: {len(run.landmark_map) - tentative} landmarks, {tentative} tentative")
+    say(f"{database}: {len(run.landmark_map) - tentative} landmarks, {tentative} tentative")
     rows = [
         [str(log.recording), str(source.bundles), str(source.used)]
         for log, source in zip(run.logs, run.sources, strict=True)

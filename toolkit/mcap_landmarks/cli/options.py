@@ -2,22 +2,26 @@
 
 import re
 from datetime import datetime
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location, location
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of text.")]
 Output = Annotated[
-    Path, typer.Option("-o", "--output", help="Where to write: a file, or a folder for several outputs.")
+    Location,
+    typer.Option("-o", "--output", parser=location, help="Where to write: a file, or a folder for several outputs."),
 ]
 MaybeOutput = Annotated[
-    Path | None, typer.Option("-o", "--output", help="Where to write: a file, or a folder for several outputs.")
+    Location | None,
+    typer.Option("-o", "--output", parser=location, help="Where to write: a file, or a folder for several outputs."),
 ]
-MapFile = Annotated[Path, typer.Option("--map", help="Landmark database (SQLite file).")]
-MaybeMapFile = Annotated[Path | None, typer.Option("--map", help="Landmark database (SQLite file).")]
+MapFile = Annotated[Location, typer.Option("--map", parser=location, help="Landmark database (SQLite file).")]
+MaybeMapFile = Annotated[
+    Location | None, typer.Option("--map", parser=location, help="Landmark database (SQLite file).")
+]
 ResultsOnly = Annotated[bool, typer.Option("--results-only", help="Write the new channels without the input's.")]
 Start = Annotated[
     str | None,
@@ -49,17 +53,23 @@ Every = Annotated[
     str | None,
     typer.Option("--every", metavar="0.2m,5deg", help="Leave out images until the robot moved or turned so far."),
 ]
-Model = Annotated[Path | None, typer.Option("--model", help="Detector: any YOLOv5 export (ONNX).")]
-Names = Annotated[Path | None, typer.Option("--names", help="Class names, one per line, where the model has none.")]
+Model = Annotated[Location | None, typer.Option("--model", parser=location, help="Detector: any YOLOv5 export (ONNX).")]
+Names = Annotated[
+    Location | None,
+    typer.Option("--names", parser=location, help="Class names, one per line, where the model has none."),
+]
 Extrinsics = Annotated[
-    Path | None, typer.Option("--extrinsics", help="Where the sensors are on the robot, if the log does not say.")
+    Location | None,
+    typer.Option("--extrinsics", parser=location, help="Where the sensors are on the robot, if the log does not say."),
 ]
 Use = Annotated[
     list[str] | None,
     typer.Option("--use", metavar="STAGE", help="Stage to use where several can make what the log lacks; repeatable."),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Run every stage anew, also where its results are there.")]
-ConfigFile = Annotated[Path | None, typer.Option("--config", help="TOML file with one table per stage.")]
+ConfigFile = Annotated[
+    Location | None, typer.Option("--config", parser=location, help="TOML file with one table per stage.")
+]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="STAGE.KEY=VALUE", help="One setting; repeatable.")]
 Method = Annotated[str | None, typer.Option("--method", help="Sets the method of every stage: default or thesis.")]
 

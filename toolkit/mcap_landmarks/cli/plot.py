@@ -2,13 +2,13 @@
 
 from enum import StrEnum
 from functools import partial
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, warn
+from mcap_landmarks.locations import Location, location, size_of
 
 
 class Show(StrEnum):
@@ -21,8 +21,10 @@ class Show(StrEnum):
 
 def command(
     inputs: Annotated[
-        list[Path],
-        typer.Argument(metavar="INPUT...", help="Logs with results, a MAP.db, or results.txt as in Appendix D."),
+        list[Location],
+        typer.Argument(
+            metavar="INPUT...", parser=location, help="Logs with results, a MAP.db, or results.txt as in Appendix D."
+        ),
     ],
     output: options.Output,
     align: Annotated[
@@ -34,13 +36,14 @@ def command(
     title: Annotated[str, typer.Option("--title", help="A line above the plot.")] = "",
 ) -> None:
     """Plot INPUT... into one picture (.png, .svg, .pdf): landmarks by class, paths, positions and their errors."""
-    from mcap_landmarks.atomic import atomic_file
+    from mcap_landmarks.atomic import atomic_file, check_target
     from mcap_landmarks.report.drawing import gather
     from mcap_landmarks.report.error_plots import errors_figure, positions_figure
     from mcap_landmarks.report.plots import figure, form_of, save
 
     form = form_of(output)
-    with progress("read", sum(path.stat().st_size for path in inputs if path.is_file())) as advance:
+    check_target(output)
+    with progress("read", sum(map(size_of, inputs))) as advance:
         drawing, losses = gather(inputs, aligned=align, progress=advance)
     draw = {Show.MAP: figure, Show.POSITIONS: positions_figure, Show.ERRORS: errors_figure}[show]
     with atomic_file(output) as stream:

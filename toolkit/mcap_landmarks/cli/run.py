@@ -1,6 +1,5 @@
 """Run stages over logs, and only those whose results are not there yet."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,13 +9,14 @@ from mcap_landmarks.cli.console import say, table
 from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.pipeline import LogRun
 
 
 def command(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Recordings (MCAP).")],
+    logs: Annotated[list[Location], typer.Argument(metavar="LOG...", parser=location, help="Recordings (MCAP).")],
     stages: Annotated[
         str, typer.Option("--stages", metavar="NAME,...", help="Stages, such as detect,cluster,fuse,localize.")
     ],

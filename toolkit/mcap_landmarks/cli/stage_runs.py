@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -10,6 +9,7 @@ import typer
 from mcap_landmarks.cli.console import PARTIAL, progress, say_json, warn
 from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
 from mcap_landmarks.cli.options import time_ns
+from mcap_landmarks.locations import Location
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.bundles import Span
@@ -28,10 +28,10 @@ class Given:
     options: LogOptions
     images: ImageOptions = field(default_factory=ImageOptions)
     scans: ScanOptions = field(default_factory=ScanOptions)
-    files: Mapping[str, Path | None] = field(default_factory=dict)
+    files: Mapping[str, Location | None] = field(default_factory=dict)
     use: Sequence[str] | None = None
 
-    def requests(self, logs: Sequence[Path]) -> "list[Request]":
+    def requests(self, logs: Sequence[Location]) -> "list[Request]":
         """What to do with each log.
 
         Raises:
@@ -56,7 +56,7 @@ class Given:
 
 
 def run_over(
-    verb: str, names: Sequence[str], logs: Sequence[Path], output: Path, given: Given, *, lacking: bool = False
+    verb: str, names: Sequence[str], logs: Sequence[Location], output: Location, given: Given, *, lacking: bool = False
 ) -> "list[LogRun]":
     """Run stages over every log; `lacking` puts those before them that a log still lacks."""
     from mcap_landmarks.runs.outputs import output_files
@@ -94,7 +94,7 @@ def finish(
         raise typer.Exit(PARTIAL)
 
 
-def tell(path: Path, stages: "Sequence[StageRun]", notes: Sequence[str], losses: Sequence[str]) -> None:
+def tell(path: Location, stages: "Sequence[StageRun]", notes: Sequence[str], losses: Sequence[str]) -> None:
     """What every stage did and why, what was left out and what was lost, on stderr."""
     for run in stages:
         warn(f"{path}: {run.stage} {run.state}: {run.reason}")

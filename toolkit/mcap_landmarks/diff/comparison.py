@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 
 from mcap_landmarks.channels import ANNOTATIONS
 from mcap_landmarks.diff.channel import ChannelDiff
@@ -17,6 +16,7 @@ from mcap_landmarks.diff.tolerances import Declared, asked, declared
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.evaluation.metrics import alignment_document
 from mcap_landmarks.evaluation.read import is_database
+from mcap_landmarks.locations import Location, size_of
 from mcap_landmarks.manifest import RUN
 from mcap_landmarks.maps.database import read_manifest, read_map
 from mcap_landmarks.messages.annotations import ImageAnnotations
@@ -39,12 +39,12 @@ class Diff:
 
 
 def diff(
-    baseline: Path,
-    candidate: Path,
+    baseline: Location,
+    candidate: Location,
     tolerances: Sequence[str] = (),
     conditions: Sequence[FailCondition] = (),
     *,
-    reference: Path | None = None,
+    reference: Location | None = None,
     aligned: bool = False,
     progress: Progress | None = None,
 ) -> Diff:
@@ -69,11 +69,11 @@ def diff(
 
 
 def _of_logs(
-    baseline: Path,
-    candidate: Path,
+    baseline: Location,
+    candidate: Location,
     tolerances: Sequence[str],
     conditions: Sequence[FailCondition],
-    reference: Path | None,
+    reference: Location | None,
     progress: Progress | None,
 ) -> Diff:
     with open_recording(baseline) as mine, open_recording(candidate) as theirs:
@@ -98,11 +98,11 @@ def _of_logs(
 
 
 def _of_maps(
-    baseline: Path,
-    candidate: Path,
+    baseline: Location,
+    candidate: Location,
     tolerances: Sequence[str],
     conditions: Sequence[FailCondition],
-    reference: Path | None,
+    reference: Location | None,
     *,
     aligned: bool,
 ) -> Diff:
@@ -175,8 +175,8 @@ def _document(
     }
 
 
-def _equal_bytes(baseline: Path, candidate: Path) -> bool:
-    if baseline.stat().st_size != candidate.stat().st_size:
+def _equal_bytes(baseline: Location, candidate: Location) -> bool:
+    if size_of(baseline) != size_of(candidate):
         return False
     with baseline.open("rb") as mine, candidate.open("rb") as theirs:
         while block := mine.read(1 << 20):

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 
 from mcap_landmarks.diff.document import MetricEntry
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.evaluation.metrics import NOWHERE, Reference, RunResult, evaluate
 from mcap_landmarks.evaluation.read import read_reference, read_run
 from mcap_landmarks.evaluation.trajectory import interpolated
+from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.map_message import scene_from_map
 from mcap_landmarks.maps.model import LandmarkMap, Source
 from mcap_landmarks.messages.match import Status
@@ -25,7 +25,7 @@ def metric_names() -> list[str]:
 
 
 def metric_rows(
-    baseline: Path, candidate: Path, reference: Path | None = None, *, same_recording: bool = False
+    baseline: Location, candidate: Location, reference: Location | None = None, *, same_recording: bool = False
 ) -> tuple[dict[str, MetricEntry], list[str]]:
     """The figures of both by name, and what could not be read; no figures unless both have truth and can be evaluated.
 

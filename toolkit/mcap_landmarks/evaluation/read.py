@@ -1,7 +1,5 @@
 """What is evaluated, from files: recordings with results, landmark databases, Appendix D's text, TUM trajectories."""
 
-from pathlib import Path
-
 import numpy as np
 
 from mcap_landmarks.channels import (
@@ -20,6 +18,7 @@ from mcap_landmarks.evaluation import tum
 from mcap_landmarks.evaluation.collected import ONCE, Collected
 from mcap_landmarks.evaluation.metrics import NOWHERE, Reference, RunResult
 from mcap_landmarks.evaluation.trajectory import Trajectory
+from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.database import read_map
 from mcap_landmarks.maps.exchange import read_text
 from mcap_landmarks.maps.exchange_thesis import parse_results
@@ -35,7 +34,7 @@ _AT_ONCE = 2000
 """So many messages become columns together; memory stays small."""
 
 
-def read_run(path: Path, progress: Progress | None = None) -> tuple[RunResult, Reference, list[str]]:
+def read_run(path: Location, progress: Progress | None = None) -> tuple[RunResult, Reference, list[str]]:
     """What a file holds to evaluate, its own reference, and what of it could not be read.
 
     The file is a recording with results, a landmark database, or (.txt) results as in the thesis's Appendix D.
@@ -51,7 +50,7 @@ def read_run(path: Path, progress: Progress | None = None) -> tuple[RunResult, R
     return found.result(), found.reference(), found.losses
 
 
-def read_reference(path: Path, progress: Progress | None = None) -> tuple[Reference, list[str]]:
+def read_reference(path: Location, progress: Progress | None = None) -> tuple[Reference, list[str]]:
     """The truth in a file, a TUM trajectory (.tum, .txt) or a recording, and what of it could not be read.
 
     Raises:
@@ -66,7 +65,7 @@ def read_reference(path: Path, progress: Progress | None = None) -> tuple[Refere
     return reference, found.losses
 
 
-def _appendix_d(path: Path) -> tuple[RunResult, Reference]:
+def _appendix_d(path: Location) -> tuple[RunResult, Reference]:
     results = parse_results(read_text(path), str(path))
     count = len(results.classes)
     unknown = np.full((count, 1), np.nan)  # the thesis estimates no heading
@@ -78,7 +77,7 @@ def _appendix_d(path: Path) -> tuple[RunResult, Reference]:
     )
 
 
-def is_database(path: Path) -> bool:
+def is_database(path: Location) -> bool:
     """Whether a file is, or by its name should be, a landmark database."""
     try:
         with path.open("rb") as stream:
@@ -87,7 +86,7 @@ def is_database(path: Path) -> bool:
         return path.suffix == ".db"  # opening it says what is wrong
 
 
-def _collect(path: Path, channels: tuple[Channel[Message], ...], progress: Progress | None) -> Collected:
+def _collect(path: Location, channels: tuple[Channel[Message], ...], progress: Progress | None) -> Collected:
     found = Collected(str(path))
     with open_recording(path) as recording:
         connections = _connections(recording, channels)

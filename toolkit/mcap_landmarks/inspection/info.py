@@ -11,6 +11,7 @@ from mcap_landmarks.inspection.checks import Finding, check
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog, open_logs
 from mcap_landmarks.inspection.survey import survey
 from mcap_landmarks.inspection.topic_roles import ROLES, topics_for
+from mcap_landmarks.locations import Location
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.sources import Log
 from mcap_landmarks.stage import Watch
@@ -59,18 +60,18 @@ class LogInfo:
     findings: tuple[Finding, ...] | None = None
 
 
-def describe(path: Path, settings: Settings, watch: Watch | None = None) -> list[LogInfo]:
-    """The logs at a path: a recording, a bag or a data set; with `watch` all of it is read, and checked.
+def describe(place: Location, settings: Settings, watch: Watch | None = None) -> list[LogInfo]:
+    """The logs at a place: a recording, a bag or a data set; with `watch` all of it is read, and checked.
 
     Raises:
         RecordingError: it cannot be read.
     """
-    with open_logs(path, settings) as logs:
+    with open_logs(place, settings) as logs:
         described = []
         for log in logs:
-            if path.is_file() and len(log.parts) == 1 and isinstance(log.parts[0], McapLog):
-                with open_recording(path) as recording:  # also the channels that cannot be converted
-                    losses = [f"{path.name}: {loss}" for loss in recording.losses]
+            if log.path.is_file() and len(log.parts) == 1 and isinstance(log.parts[0], McapLog):
+                with open_recording(log.path) as recording:  # also the channels that cannot be converted
+                    losses = [f"{log.path.name}: {loss}" for loss in recording.losses]
                     described.append(_describe(log, recording.profile, [recording], losses))
             else:
                 losses = [*log.losses, *(loss for part in log.parts for loss in part.losses)]

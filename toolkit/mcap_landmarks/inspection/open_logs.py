@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mcap_landmarks.config import Settings, stage_config
 from mcap_landmarks.errors import MessageError
+from mcap_landmarks.locations import Location, to_read
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import RecordingWriter
 from mcap_landmarks.sources import Carried, Log, McapFile, source_of
@@ -40,13 +41,14 @@ class OpenLog:
 
 
 @contextlib.contextmanager
-def open_logs(path: Path, settings: Settings) -> Iterator[Sequence[OpenLog]]:
-    """The logs at a path, each with all its parts.
+def open_logs(place: Location, settings: Settings) -> Iterator[Sequence[OpenLog]]:
+    """The logs at a place, each with all its parts.
 
     Raises:
-        RecordingError: no source knows the path, or it cannot be read.
-        UsageError: a setting of its source is wrong.
+        RecordingError: no source knows it, or it cannot be read.
+        UsageError: it is not on this machine, or a setting of its source is wrong.
     """
+    path = to_read(place)
     source = source_of(path)
     config = stage_config(source.config, source.name, settings.get(source.name, {}))
     with source.open(path, config) as found:

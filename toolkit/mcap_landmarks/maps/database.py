@@ -4,13 +4,13 @@ import contextlib
 import hashlib
 import sqlite3
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from urllib.parse import quote
 
 import numpy as np
 
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.errors import MapError
+from mcap_landmarks.locations import Location, to_read
 from mcap_landmarks.maps.model import Group, LandmarkMap, Source
 from mcap_landmarks.maps.neighbours import Neighbours
 from mcap_landmarks.resources import resource
@@ -26,13 +26,13 @@ _KEPT = {"triangles": 3, "pairs": 2}
 _LARGE = 20_000
 
 
-def read_map(path: Path) -> LandmarkMap:
+def read_map(path: Location) -> LandmarkMap:
     """The map in a database.
 
     Raises:
         MapError: no such file, no landmark database, another schema version, or damaged content.
     """
-    if not path.is_file():
+    if not to_read(path).is_file():
         raise MapError(f"{path}: there is no such map; build it with `map` or `landmarks import`")
     try:
         with _reading(path) as database:
@@ -42,9 +42,9 @@ def read_map(path: Path) -> LandmarkMap:
         raise MapError(f"{path}: is not a landmark database or is damaged ({error}); build it again") from error
 
 
-def read_manifest(path: Path) -> dict[str, str]:
+def read_manifest(path: Location) -> dict[str, str]:
     """What ran to build the map in a database, by entry; nothing if that is unknown, or there is no such map."""
-    if not path.is_file():
+    if not to_read(path).is_file():
         return {}
     try:
         with _reading(path) as database:
@@ -53,7 +53,7 @@ def read_manifest(path: Path) -> dict[str, str]:
         return {}
 
 
-def read_neighbours(path: Path, landmark_map: LandmarkMap) -> Neighbours | None:
+def read_neighbours(path: Location, landmark_map: LandmarkMap) -> Neighbours | None:
     """What is kept of the search index of a map that was read from a database.
 
     None where nothing is (small maps are indexed in no time), or where the landmarks were changed since.
@@ -69,7 +69,7 @@ def read_neighbours(path: Path, landmark_map: LandmarkMap) -> Neighbours | None:
     return Neighbours(*(found[name].reshape(-1, size) for name, size in _KEPT.items()))
 
 
-def write_map(path: Path, landmark_map: LandmarkMap, manifest: Mapping[str, str] | None = None) -> None:
+def write_map(path: Location, landmark_map: LandmarkMap, manifest: Mapping[str, str] | None = None) -> None:
     """Write a map to a new database, or over the old one once it is whole. Same map, same bytes.
 
     `manifest` says what ran to build it, where that is known.
@@ -90,14 +90,14 @@ def write_map(path: Path, landmark_map: LandmarkMap, manifest: Mapping[str, str]
 
 
 @contextlib.contextmanager
-def _reading(path: Path) -> Iterator[sqlite3.Connection]:
+def _reading(path: Location) -> Iterator[sqlite3.Connection]:
     # immutable: no journal or lock file appears beside a map that is only read
-    address = f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1"
+    address = f"file:{quote(str(to_read(path).resolve()))}?mode=ro&immutable=1"
     with contextlib.closing(sqlite3.connect(address, uri=True)) as database:
         yield database
 
 
-def _check_version(path: Path, database: sqlite3.Connection) -> None:
+def _check_version(path: Location, database: sqlite3.Connection) -> None:
     application = database.execute("PRAGMA application_id").fetchone()[0]
     version = database.execute("PRAGMA user_version").fetchone()[0]
     if application != APPLICATION_ID:
@@ -109,7 +109,7 @@ def _check_version(path: Path, database: sqlite3.Connection) -> None:
         )
 
 
-def _read(path: Path, database: sqlite3.Connection) -> LandmarkMap:
+def _read(path: Location, database: sqlite3.Connection) -> LandmarkMap:
     try:
         return _map_of(database)
     except MapError as error:

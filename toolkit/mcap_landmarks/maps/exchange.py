@@ -2,10 +2,10 @@
 
 import json
 from enum import StrEnum
-from pathlib import Path
 
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.errors import MapError, UsageError
+from mcap_landmarks.locations import Location, to_read
 from mcap_landmarks.maps import exchange_csv, exchange_json, exchange_thesis
 from mcap_landmarks.maps.model import LandmarkMap
 
@@ -21,7 +21,7 @@ class Format(StrEnum):
 _OF_SUFFIX = {".txt": Format.THESIS, ".csv": Format.CSV, ".json": Format.JSON}
 
 
-def format_of(path: Path) -> Format:
+def format_of(path: Location) -> Format:
     """The format that a file's name stands for.
 
     Raises:
@@ -34,7 +34,7 @@ def format_of(path: Path) -> Format:
         raise UsageError(f"{path}: the name does not tell the format; use {known}, or --format") from None
 
 
-def import_map(path: Path, form: Format) -> LandmarkMap:
+def import_map(path: Location, form: Format) -> LandmarkMap:
     """The map in a text file.
 
     Raises:
@@ -48,7 +48,7 @@ def import_map(path: Path, form: Format) -> LandmarkMap:
     return exchange_json.parse(text, str(path))
 
 
-def export_map(path: Path, landmark_map: LandmarkMap, form: Format) -> None:
+def export_map(path: Location, landmark_map: LandmarkMap, form: Format) -> None:
     """Write a map to a text file, whole or not at all.
 
     Raises:
@@ -64,14 +64,14 @@ def export_map(path: Path, landmark_map: LandmarkMap, form: Format) -> None:
         stream.write(text.encode())
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Location) -> str:
     """The text of a file, which must be UTF-8.
 
     Raises:
         MapError: it cannot be read.
     """
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return to_read(path).read_bytes().decode("utf-8-sig")
     except OSError as error:
         raise MapError(f"{path}: cannot be read ({error.strerror}); name a file with a map or results") from error
     except UnicodeDecodeError as error:

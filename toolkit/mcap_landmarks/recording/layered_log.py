@@ -3,8 +3,8 @@
 import heapq
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import STAGE, StageRecord, stage_records
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
@@ -22,7 +22,7 @@ class Layer:
 class LayeredLog:
     """Layers that are read as one recording. Messages of equal time come in the order of the layers."""
 
-    def __init__(self, path: Path, layers: Sequence[Layer]) -> None:
+    def __init__(self, path: Location, layers: Sequence[Layer]) -> None:
         self.path, self.layers = path, tuple(layers)
         self.channels = tuple(entry for layer in layers for entry in layer.channels)
 

@@ -5,7 +5,6 @@ import hashlib
 import heapq
 from collections.abc import Collection, Iterator
 from functools import cached_property
-from pathlib import Path
 from struct import error as struct_error
 from typing import BinaryIO
 
@@ -13,6 +12,7 @@ from mcap import records
 from mcap.exceptions import McapError
 
 from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, carried_fingerprint
 from mcap_landmarks.recording.blocks import DamagedBlockError, block_messages
 from mcap_landmarks.recording.container import CHUNK, MAGIC, RECORD, Opcode, parse
@@ -22,7 +22,7 @@ from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessag
 
 
 @contextlib.contextmanager
-def open_recording(path: Path, *, verify: bool = True) -> Iterator["Recording"]:
+def open_recording(path: Location, *, verify: bool = True) -> Iterator["Recording"]:
     """An open recording; `verify` checks the CRC of every chunk that is read.
 
     Raises:
@@ -32,7 +32,7 @@ def open_recording(path: Path, *, verify: bool = True) -> Iterator["Recording"]:
         yield Recording(path, stream, _index(path, stream), verify=verify)
 
 
-def _open(path: Path) -> BinaryIO:
+def _open(path: Location) -> BinaryIO:
     try:
         return path.open("rb")
     except FileNotFoundError as error:
@@ -45,7 +45,7 @@ def _open(path: Path) -> BinaryIO:
         raise RecordingError(f"{path} may not be read; change its permissions") from error
 
 
-def _index(path: Path, stream: BinaryIO) -> Index:
+def _index(path: Location, stream: BinaryIO) -> Index:
     size = stream.seek(0, 2)
     stream.seek(0)
     if size == 0:
@@ -69,7 +69,7 @@ class Recording:
     holds the entries of every metadata record by name. `losses` says in words what could not be read, so far.
     """
 
-    def __init__(self, path: Path, stream: BinaryIO, index: Index, *, verify: bool) -> None:
+    def __init__(self, path: Location, stream: BinaryIO, index: Index, *, verify: bool) -> None:
         self.path = path
         self.profile, self.library = index.header.profile, index.header.library
         self.start_ns, self.end_ns = index.start_ns, index.end_ns

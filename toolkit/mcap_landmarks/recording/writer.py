@@ -6,7 +6,6 @@ import zlib
 from array import array
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import BinaryIO
 
 from mcap import records
@@ -15,6 +14,7 @@ from zstandard import ZstdCompressor
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.channels import MAP, MAP_MARKERS, MAP_PATH, TF_STATIC, TRUTH_OBJECTS
 from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import CONTENT, RUN, STAGE, entry_text
 from mcap_landmarks.messages.codec import Message, encode
 from mcap_landmarks.messages.qos import KEY, qos_profile
@@ -32,7 +32,7 @@ _LATCHED = frozenset(channel.topic for channel in (TF_STATIC, MAP, MAP_MARKERS, 
 
 @contextlib.contextmanager
 def create_recording(
-    path: Path, metadata: Mapping[str, Mapping[str, str]] | None = None
+    path: Location, metadata: Mapping[str, Mapping[str, str]] | None = None
 ) -> Iterator["RecordingWriter"]:
     """A writer whose file takes the name `path` when the block ends well and vanishes when it does not.
 

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from mcap_landmarks.evaluation.pose_metrics import align
 from mcap_landmarks.evaluation.read import read_run
 from mcap_landmarks.evaluation.trajectory import Trajectory, interpolated
 from mcap_landmarks.geometry.se2 import Array, compose, rotation, transform_points
+from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.database import read_map
 from mcap_landmarks.maps.model import Group
 from mcap_landmarks.messages.scene import SceneObjects
@@ -45,7 +45,7 @@ class Drawing:
     runs: tuple[Run, ...] = ()
 
 
-def gather(paths: Sequence[Path], *, aligned: bool, progress: Progress | None = None) -> tuple[Drawing, list[str]]:
+def gather(paths: Sequence[Location], *, aligned: bool, progress: Progress | None = None) -> tuple[Drawing, list[str]]:
     """The drawing of maps, logs with results, or results as in Appendix D, and what of them could not be read.
 
     The first input that has a map gives the landmarks. `aligned` moves each run by the SE(2) that fits its poses best

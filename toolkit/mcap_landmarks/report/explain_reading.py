@@ -5,7 +5,6 @@ import dataclasses
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +29,7 @@ from mcap_landmarks.geometry.frames import FrameTree, apply, rigid
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.inspection.topic_roles import Choice, choose, message_type
 from mcap_landmarks.localization.config import LocalizeConfig
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN
 from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.scan import LaserScan
@@ -52,7 +52,7 @@ class View:
     scan_xy: Array | None = None
 
 
-def read_situation(path: Path, at_ns: int) -> tuple[Situation, View]:
+def read_situation(path: Location, at_ns: int) -> tuple[Situation, View]:
     """The bundle of a log that is nearest in time, and what its sensors saw.
 
     Raises:

@@ -3,7 +3,6 @@
 import warnings
 from collections import Counter
 from collections.abc import Callable
-from pathlib import Path
 from typing import BinaryIO
 
 import matplotlib as mpl
@@ -15,6 +14,7 @@ from matplotlib.figure import Figure
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.evaluation.pose_metrics import FALSE_M
 from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.model import Group
 from mcap_landmarks.report.drawing import Drawing, Run, breaks
 
@@ -30,7 +30,7 @@ _RADII_95 = 2.4477
 _MOST_LABELS = 60
 
 
-def form_of(path: Path) -> str:
+def form_of(path: Location) -> str:
     """The format that a file's name asks for.
 
     Raises:

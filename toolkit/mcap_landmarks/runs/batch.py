@@ -13,6 +13,7 @@ from pathlib import Path
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.inspection.open_logs import open_logs
+from mcap_landmarks.locations import location, to_read
 
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM", "VECLIB_MAXIMUM_THREADS"),
@@ -45,12 +46,13 @@ def find_logs(patterns: Sequence[str]) -> list[Path]:
     """The paths that the patterns (`**` is any depth) name, each once: by pattern, then by name.
 
     Raises:
-        UsageError: a pattern matches nothing.
+        UsageError: a pattern is a URL, or matches nothing.
     """
     found: dict[Path, None] = {}
     for pattern in patterns:
+        path = to_read(location(pattern))
         # Path.glob takes no absolute pattern.
-        matches = [pattern] if Path(pattern).exists() else sorted(glob.glob(pattern, recursive=True))  # noqa: PTH207
+        matches = [pattern] if path.exists() else sorted(glob.glob(pattern, recursive=True))  # noqa: PTH207
         if not matches:
             raise UsageError(f"{pattern}: no file matches; quote the pattern and check the folder")
         found.update(dict.fromkeys(map(Path, matches)))

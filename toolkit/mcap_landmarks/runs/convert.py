@@ -11,6 +11,7 @@ from pathlib import Path
 from mcap_landmarks.config import Settings
 from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.inspection.open_logs import OpenLog, open_logs
+from mcap_landmarks.locations import Location, to_write
 from mcap_landmarks.manifest import file_hash
 from mcap_landmarks.runs.conversion import Converted, Job, Selection
 from mcap_landmarks.runs.outputs import make_folder, output_files
@@ -25,24 +26,26 @@ class Conversion:
     failures: list[ToolkitError] = field(default_factory=list)
 
 
-def convert(paths: Sequence[Path], output: Path, selection: Selection, settings: Settings, watch: Watch) -> Conversion:
-    """Convert the logs at some paths: into the file `output`, merged by time, or one by one into that folder.
+def convert(
+    inputs: Sequence[Location], output: Location, selection: Selection, settings: Settings, watch: Watch
+) -> Conversion:
+    """Convert the logs of some inputs: into the file `output`, merged by time, or one by one into that folder.
 
-    A folder is meant where a path has several logs, or where several paths meet an `output` without `.mcap`.
+    A folder is meant where an input has several logs, or where several inputs meet an `output` without `.mcap`.
 
     Raises:
         ToolkitError: nothing could be converted; nothing is left behind.
     """
-    patterns = _patterns(selection.topics)
+    there, patterns = to_write(output), _patterns(selection.topics)
     conversion = Conversion()
-    for path, count in Counter(paths).items():
+    for place, count in Counter(inputs).items():
         if count > 1:
-            raise UsageError(f"{path} is given {count} times; name each input once")
+            raise UsageError(f"{place} is given {count} times; name each input once")
     with contextlib.ExitStack() as stack:
-        logs = [log for path in paths for log in stack.enter_context(open_logs(path, settings))]
-        stack.enter_context(_no_empty_folder(output))
-        plan = _plan(logs, output)
-        hashes = {path: _content_hash(path, watch) for path in paths}
+        logs = [log for place in inputs for log in stack.enter_context(open_logs(place, settings))]
+        stack.enter_context(_no_empty_folder(there))
+        plan = _plan(logs, there)
+        hashes = {path: _content_hash(path, watch) for path in dict.fromkeys(log.path for log in logs)}
         for target, group in plan.items():
             try:
                 job = Job(target, group, selection, patterns)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mcap_landmarks.config import load
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import StageRecord
 from mcap_landmarks.runs.bundles import inputs_of
 from mcap_landmarks.runs.needed_stages import missing_stages
@@ -21,11 +22,11 @@ class MapTask:
 
     requests: tuple[Request, ...]
     database: Path
-    outputs: Mapping[Path, Path] = field(default_factory=dict)
-    prior: Path | None = None
+    outputs: Mapping[Location, Path] = field(default_factory=dict)
+    prior: Location | None = None
 
     @property
-    def files(self) -> dict[str, Path]:
+    def files(self) -> dict[str, Location]:
         """The files that the map is made with."""
         return {"prior": self.prior} if self.prior is not None else {}
 
@@ -84,7 +85,7 @@ def _plan_log(place: str, config: Config, request: Request, task: MapTask, parts
 
 def _check_each_once(logs: Sequence[LogPlan]) -> None:
     """Refuse a recording that is named twice, also as an output of ours: what it saw would count double."""
-    known: dict[str, Path] = {}
+    known: dict[str, Location] = {}
     for log in logs:
         path = log.request.recording
         if log.fingerprint in known:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mcap_landmarks.channels import MAP_MARKERS, MAP_PATH, MAP_POSE
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, Manifest, Outcome, stage_records
 from mcap_landmarks.mapping.observations import Trajectory
 from mcap_landmarks.maps.database import read_manifest, read_map
@@ -28,7 +29,7 @@ LOGS = "logs"
 class MappedLog:
     """What became of one log on its way into a map; `outcome` counts its bundles and all that was lost."""
 
-    recording: Path
+    recording: Location
     fingerprint: str
     stages: tuple[StageRun, ...]
     outcome: Outcome

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location, to_read
 from mcap_landmarks.manifest import Outcome
 from mcap_landmarks.runs.needed_stages import in_order, missing_stages
 from mcap_landmarks.runs.output_writer import write_output
@@ -19,7 +20,7 @@ from mcap_landmarks.stages import find_stage
 class LogRun:
     """What became of one log: where the output is, what each stage did, and what is to be said about the log."""
 
-    recording: Path
+    recording: Location
     output: Path
     stages: tuple[StageRun, ...]
     notes: tuple[str, ...] = ()
@@ -68,12 +69,12 @@ def told(
     return tuple(dict.fromkeys([*noted, *notes])), tuple(dict.fromkeys([*lost, *losses]))
 
 
-def check_output(recording: Path, output: Path) -> None:
+def check_output(recording: Location, output: Path) -> None:
     """Refuse an output that cannot be written or is the input.
 
     Raises:
         UsageError: as it says.
     """
     check_target(output)
-    if output.resolve() == recording.resolve():
+    if output.resolve() == to_read(recording).resolve():
         raise UsageError(f"{output} is the input itself; write to another file")

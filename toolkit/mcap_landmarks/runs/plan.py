@@ -14,11 +14,11 @@ A setting on its way, `--set fuse.bearing_gate=4`:
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from pathlib import Path
 
 from mcap_landmarks.channels import ODOMETRY, RESULTS
 from mcap_landmarks.config import Settings, effective, load_files
 from mcap_landmarks.inspection.topic_roles import ROLES, Choice
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RECORDING, StageRecord, code_hash, file_hash
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.runs.bundles import Span
@@ -36,9 +36,9 @@ class Request:
     results there are.
     """
 
-    recording: Path
+    recording: Location
     settings: Settings = field(default_factory=dict)
-    files: Mapping[str, Path | None] = field(default_factory=dict)
+    files: Mapping[str, Location | None] = field(default_factory=dict)
     span: Span = field(default_factory=Span)
     thinning: Thinning = field(default_factory=Thinning)
     use: tuple[str, ...] = ()
@@ -65,7 +65,7 @@ class Step:
 
     stage: Stage
     config: Config
-    files: Mapping[str, Path]
+    files: Mapping[str, Location]
     record: StageRecord
 
 
@@ -105,7 +105,7 @@ def is_result(channel: Channel[Message], choice: Choice) -> bool:
 def record_of(
     stage: Stage | Reduction,
     config: Config,
-    files: Mapping[str, Path],
+    files: Mapping[str, Location],
     inputs: Mapping[str, str],
     options: Mapping[str, object],
 ) -> StageRecord:

@@ -1,9 +1,8 @@
 """The surveyed map that a recording's truth gives, as a landmark database."""
 
-from pathlib import Path
-
 from mcap_landmarks.channels import TRUTH_OBJECTS
 from mcap_landmarks.errors import MapError
+from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.database import write_map
 from mcap_landmarks.maps.map_message import map_from_scene
 from mcap_landmarks.maps.model import LandmarkMap, Source
@@ -11,17 +10,17 @@ from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.recording.reader import open_recording
 
 
-def map_from_reference(path: Path, target: Path) -> LandmarkMap:
+def map_from_reference(log: Location, target: Location) -> LandmarkMap:
     """The map of a log's `/ground_truth/objects`, written as a database.
 
     Raises:
         MapError: the log has no such message.
     """
-    with open_recording(path) as recording:
+    with open_recording(log) as recording:
         raw = next(recording.messages(recording.connections(TRUTH_OBJECTS.topic)), None)
         if raw is None:
             raise MapError(
-                f"{path}: there are no {TRUTH_OBJECTS.topic}; build the map from the log without --from-reference"
+                f"{log}: there are no {TRUTH_OBJECTS.topic}; build the map from the log without --from-reference"
             )
         scene = decode(TRUTH_OBJECTS.message, raw.data)
         landmark_map = map_from_scene(scene, Source("reference", recording.fingerprint()))

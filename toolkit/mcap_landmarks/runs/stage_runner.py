@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, Manifest, Outcome, StageRecord
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.recording.writer import create_recording
@@ -45,7 +46,7 @@ def outcome_of(reading: Reading, counts: Counter[str] | None = None, notes: tupl
     return Outcome(reading.association.bundles, unreadable, counted, reading.notes(), tuple(reading.losses), notes)
 
 
-def naming(path: Path, results: Iterator[Stamped | Omission]) -> Iterator[Stamped | Omission]:
+def naming(path: Location, results: Iterator[Stamped | Omission]) -> Iterator[Stamped | Omission]:
     """Results of a stage, which does not know where they come from; what it complains of gets the path of the log."""
     try:
         yield from results

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.object_tracks import Tracks
 from mcap_landmarks.lidar.objects import Hypotheses
 from mcap_landmarks.lidar.scan_beams import beams_of
+from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
@@ -26,7 +26,7 @@ _BASES = (BASE_FRAME, "base_link")
 
 
 def process(
-    bundles: Iterable[Bundle], config: ClusterConfig, resources: Mapping[str, Path]
+    bundles: Iterable[Bundle], config: ClusterConfig, resources: Mapping[str, Location]
 ) -> Iterator[Stamped | Omission]:
     """The objects of every scan, none for a scan that shows none; a scan without directions is an omission.
 

@@ -3,13 +3,13 @@
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
 
 from mcap_landmarks.channels import ANNOTATIONS, CAMERA_IMAGE, DETECTIONS, annotations_topic
 from mcap_landmarks.errors import MessageError, RecordingError, UsageError
+from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CompressedImage, Image
 from mcap_landmarks.resources import detector
@@ -26,7 +26,7 @@ from mcap_landmarks.vision.session import open_session
 
 
 def process(
-    bundles: Iterable[Bundle], config: DetectConfig, resources: Mapping[str, Path]
+    bundles: Iterable[Bundle], config: DetectConfig, resources: Mapping[str, Location]
 ) -> Iterator[Stamped | Omission]:
     """Detections and annotations of every image; an image that cannot be read is an omission.
 
@@ -64,7 +64,7 @@ def _at_once(config: DetectConfig) -> int:
     return (config.threads or os.cpu_count() or 1) if config.provider == "cpu" else 1
 
 
-def _classifier(path: Path | None, detector: Detector, config: DetectConfig) -> Classifier | None:
+def _classifier(path: Location | None, detector: Detector, config: DetectConfig) -> Classifier | None:
     if path is None:
         return None
     colours = config.classifier_mean, config.classifier_std

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from mcap_landmarks.fusion.fuser import Fuser
 from mcap_landmarks.fusion.markers import markers_from_scene
 from mcap_landmarks.fusion.thesis import fuse_in_order
 from mcap_landmarks.geometry.camera import CameraModel
+from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.scan_objects import ScanObjects
@@ -36,7 +36,7 @@ _UNUSABLE = "scan objects without a finite place"
 
 
 def process(
-    bundles: Iterable[Bundle], config: FuseConfig, resources: Mapping[str, Path]
+    bundles: Iterable[Bundle], config: FuseConfig, resources: Mapping[str, Location]
 ) -> Iterator[Stamped | Omission]:
     """A scene of every scan, with markers; detections that come to nothing are omissions.
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from mcap_landmarks.localization.repeated_classes import RepeatedClassLocalizer
 from mcap_landmarks.localization.thesis import locate_as_in_the_thesis
 from mcap_landmarks.localization.unique_classes import UniqueClassLocalizer
 from mcap_landmarks.localization.validation import check_map
+from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.database import read_map, read_neighbours
 from mcap_landmarks.maps.map_message import scene_from_map
 from mcap_landmarks.maps.model import LandmarkMap
@@ -48,7 +48,7 @@ Locate = Callable[[Sequence[SceneObjects], Sequence[OdometryAt | None]], list[Ma
 
 
 def process(
-    bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Path]
+    bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Location]
 ) -> Iterator[Stamped | Omission]:
     """Match and pose of every bundle, the map once before the first; a transform that cannot be is an omission."""
     landmark_map = _usable_map(resources["map"])
@@ -63,7 +63,7 @@ def process(
             yield from _messages(bundle, match, landmark_map.frame, config)
 
 
-def _usable_map(path: Path) -> LandmarkMap:
+def _usable_map(path: Location) -> LandmarkMap:
     """The map in a database, if a pose can be found in it.
 
     Raises:
@@ -77,7 +77,7 @@ def _usable_map(path: Path) -> LandmarkMap:
     return landmark_map
 
 
-def _method(path: Path, landmark_map: LandmarkMap, config: LocalizeConfig) -> tuple[Locate, int]:
+def _method(path: Location, landmark_map: LandmarkMap, config: LocalizeConfig) -> tuple[Locate, int]:
     """The way to localize that the configuration and the map's classes ask for, and how many bundles at once."""
     if config.method == "thesis":
         return lambda scenes, _odometry: locate_as_in_the_thesis(scenes, landmark_map, config), _BATCH

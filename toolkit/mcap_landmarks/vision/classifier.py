@@ -1,13 +1,13 @@
 """A second-stage image classifier: what an ONNX file must be, and what it says about parts of an image."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import ModelError
+from mcap_landmarks.locations import Location
 from mcap_landmarks.vision.metadata import names_of
 from mcap_landmarks.vision.pixels import Rgb
 from mcap_landmarks.vision.session import FLOATS, Provider, Session, fits, open_session
@@ -44,7 +44,7 @@ class Classifier:
 
 
 def open_classifier(
-    path: Path,
+    path: Location,
     fallback_names: tuple[str, ...],
     colours: tuple[tuple[float, float, float], tuple[float, float, float]],
     provider: Provider,

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import ModelError, UsageError
+from mcap_landmarks.locations import Location
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.families import family_names, find_family
 from mcap_landmarks.vision.family import Candidates, Family, Layout, Signature
@@ -30,7 +30,7 @@ class Detector:
     confidence: Mapping[str, float]
 
     @property
-    def path(self) -> Path:
+    def path(self) -> Location:
         """Where the model is."""
         return self.session.path
 
@@ -67,7 +67,7 @@ class Detector:
         return self.layout.decode(used, input_px, thresholds)
 
 
-def read_detector(session: Session, names_file: Path | None, config: DetectConfig) -> Detector:
+def read_detector(session: Session, names_file: Location | None, config: DetectConfig) -> Detector:
     """The detector that an ONNX file is, with the class names of its metadata if there is no file of them.
 
     Raises:

@@ -3,12 +3,12 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcap_landmarks.locations import Location
 from mcap_landmarks.vision.letterbox import Boxes, Colours, Letterbox, fit
 from mcap_landmarks.vision.metadata import literal
 from mcap_landmarks.vision.session import Shape, Tensor
@@ -34,7 +34,7 @@ class Signature:
     `assumed` holds values that count where the metadata have none.
     """
 
-    path: Path
+    path: Location
     inputs: tuple[Tensor, ...]
     outputs: tuple[Tensor, ...]
     classes: int

@@ -2,13 +2,13 @@
 
 import ast
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from mcap_landmarks.errors import ModelError
+from mcap_landmarks.locations import Location, to_read
 from mcap_landmarks.vision.session import Session
 
 
-def literal(path: Path, metadata: Mapping[str, str], key: str) -> object:
+def literal(path: Location, metadata: Mapping[str, str], key: str) -> object:
     """The value of one entry, written as in Python; None where there is no such entry.
 
     Raises:
@@ -23,7 +23,7 @@ def literal(path: Path, metadata: Mapping[str, str], key: str) -> object:
         raise ModelError(f"{path}: {key} in the metadata is {text[:60]!r}; export the model again") from error
 
 
-def names_of(session: Session, names_file: Path | None) -> tuple[str, ...]:
+def names_of(session: Session, names_file: Location | None) -> tuple[str, ...]:
     """The class names by class id: lines of a file, else the metadata's `names`.
 
     Raises:
@@ -31,7 +31,7 @@ def names_of(session: Session, names_file: Path | None) -> tuple[str, ...]:
     """
     if names_file is not None:
         try:
-            lines = names_file.read_text().split("\n")
+            lines = to_read(names_file).read_text().split("\n")
         except (OSError, UnicodeDecodeError) as error:
             raise ModelError(f"{names_file}: not a text file of class names, one per line: {error}") from error
         names = tuple(line.strip() for line in lines if line.strip())

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from onnxruntime.capi import onnxruntime_pybind11_state as state
 
 from mcap_landmarks.errors import ModelError, UsageError
+from mcap_landmarks.locations import Location, to_read
 
 Provider = Literal["cpu", "cuda"]
 Shape = tuple[int | None, ...]
@@ -53,7 +54,7 @@ def fits(found: Sequence[int | None], expected: Shape) -> bool:
 class Session:
     """A loaded ONNX file; made by `open_session`. It may be run from several threads."""
 
-    def __init__(self, path: Path, session: onnxruntime.InferenceSession) -> None:
+    def __init__(self, path: Location, session: onnxruntime.InferenceSession) -> None:
         self.path = path
         self.inputs = tuple(_tensor(entry) for entry in session.get_inputs())
         self.outputs = tuple(_tensor(entry) for entry in session.get_outputs())
@@ -75,18 +76,19 @@ class Session:
             ) from error
 
 
-def open_session(path: Path, provider: Provider = "cpu", threads: int = 0) -> Session:
+def open_session(path: Location, provider: Provider = "cpu", threads: int = 0) -> Session:
     """A session of an ONNX file, the same one for the same file and settings; `threads` 0: one per core.
 
     Raises:
         ModelError: the file is missing or no ONNX model.
         UsageError: the provider is not installed, or does not start.
     """
+    local = to_read(path)
     try:
-        status = path.stat()
+        status = local.stat()
     except OSError as error:
         raise ModelError(f"{path}: cannot be read ({error.strerror}); check the path of the model") from error
-    return _open(path, (status.st_mtime_ns, status.st_size), provider, threads)
+    return _open(local, (status.st_mtime_ns, status.st_size), provider, threads)
 
 
 @lru_cache(maxsize=2)

@@ -1,0 +1,117 @@
+"""A URL in any place where a verb takes a file is refused in one line that shows it as it was written."""
+
+import inspect
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from mcap_landmarks.cli.main import build, verbs
+from mcap_landmarks.locations import Location, location
+
+from tests.cli.calls import call, refused
+from tests.cli.logs import messages, write
+from tests.runs.chain import raw_log, two_posts
+
+LINES = {
+    "batch": "batch convert LOG -o {output}",
+    "cluster": "cluster {logs} -o {output} --extrinsics {extrinsics} --config {config_file}",
+    "config show": "config show --config {config_file}",
+    "convert": "convert {inputs} -o {output} --config {config_file}",
+    "demo": "demo -o {output}",
+    "detect": "detect {logs} -o {output} --model {model} --names {names} --config {config_file}",
+    "diff": "diff {baseline} {candidate} --reference {reference}",
+    "evaluate": "evaluate {result} --reference {reference} --tum {tum} --thesis {thesis}",
+    "explain": "explain {result} --at 1 -o {output}",
+    "fuse": "fuse {logs} -o {output} --extrinsics {extrinsics} --config {config_file}",
+    "generate": "generate small -o {output}",
+    "info": "info {paths}",
+    "landmarks export": "landmarks export {database} {file}",
+    "landmarks import": "landmarks import {database} {file}",
+    "landmarks show": "landmarks show {database}",
+    "localize": "localize {logs} -o {output} --map {map_file} --model {model} --extrinsics {extrinsics} "
+    "--config {config_file}",
+    "map": "map {logs} -o {output} --map {map_file} --prior {prior} --model {model} --extrinsics {extrinsics} "
+    "--config {config_file}",
+    "plot": "plot {inputs} -o {output}",
+    "run": "run {logs} -o {output} --stages detect,cluster,fuse,localize --map {map_file} --model {model} "
+    "--names {names} --extrinsics {extrinsics} --config {config_file}",
+}
+"""Every verb with every place where it takes a file, by the name of its parameter."""
+ENDINGS = {"explain": "png", "plot": "png", "landmarks import": "json", "landmarks export": "json"}
+EACH = [(verb, name) for verb, line in LINES.items() for name in re.findall(r"{(\w+)}", line)]
+
+
+def parameters() -> Iterator[tuple[str, inspect.Parameter]]:
+    """Every parameter of every verb."""
+    for verb in verbs():
+        app = build(verb)
+        single = [info for info in app.registered_commands if info.name == verb]
+        nested = [info for group in app.registered_groups for info in group.typer_instance.registered_commands]
+        for info in single or nested:
+            name = verb if single else f"{verb} {info.name or info.callback.__name__}"
+            yield from ((name, parameter) for parameter in inspect.signature(info.callback).parameters.values())
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
+    """A file for every place, by the name of its parameter, that the verbs take without complaint."""
+    folder = tmp_path_factory.mktemp("files")
+    log, scenes = raw_log(folder / "log.mcap"), write(folder / "scenes.mcap", messages())
+    database = folder / "map.db"
+    assert call("map", scenes, "--map", database) == 0
+    (folder / "names.txt").write_text("person\nfire hydrant\n")
+    (folder / "extrinsics.json").write_text('{"transforms": []}')
+    (folder / "config.toml").touch()
+    return {
+        **dict.fromkeys(("logs", "inputs", "paths", "baseline", "reference", "result"), log),
+        **dict.fromkeys(("map_file", "database", "prior"), database),
+        "candidate": scenes,
+        "model": two_posts(folder / "model.onnx"),
+        "names": folder / "names.txt",
+        "config_file": folder / "config.toml",
+        "extrinsics": folder / "extrinsics.json",
+        "file": folder / "map.json",
+        "output": folder / "new",
+        "tum": folder / "new.tum",
+        "thesis": folder / "new.txt",
+    }
+
+
+def test_every_file_of_every_verb_is_a_location() -> None:
+    takes = {(verb, p.name) for verb, p in parameters() if Location in _types(p)}
+    assert takes == set(EACH)
+    assert not [(verb, p.name) for verb, p in parameters() if Path in _types(p)]
+    assert all(get_args(p.annotation)[1].parser is location for verb, p in parameters() if (verb, p.name) in takes)
+
+
+def _types(parameter: inspect.Parameter) -> tuple[object, ...]:
+    written = get_args(parameter.annotation)[0]
+    return (written, *get_args(written))
+
+
+@pytest.mark.parametrize(("verb", "name"), EACH)
+def test_a_url_is_refused_as_it_was_written(
+    verb: str, name: str, files: Mapping[str, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    ending = ENDINGS.get(verb, "mcap")
+    url = f"https://host.example/a//x.{ending}?version=2"
+    given = {**files, "output": files["output"].with_suffix(f".{ending}"), name: url}
+    words = LINES[verb].format_map(given).replace("LOG", str(files["logs"])).split()
+    forced = ["--force"] if verb.startswith("landmarks ") and "show" not in verb else []
+    line = refused(capsys, 2, *words, *forced)
+    assert line.startswith(f"error: {url}: URLs cannot be ")
+    assert line.endswith(("read yet; download it first", "written yet; write to a file and upload that"))
+
+
+def test_other_schemes_settings_and_patterns(
+    files: Mapping[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, out = files["logs"], tmp_path / "out"
+    for url, words in (
+        ("s3://bucket/map.db", ("map", log, "--map", "s3://bucket/map.db")),
+        ("gs://bucket/m.onnx", ("detect", log, "-o", out, "--set", "detect.model=gs://bucket/m.onnx")),
+        ("s3://bucket/*.mcap", ("batch", "convert", "s3://bucket/*.mcap", "-o", out)),
+    ):
+        assert f"error: {url}: URLs cannot be " in refused(capsys, 2, *words)
