@@ -13,7 +13,7 @@ from mcap_landmarks_generator.groups import arrange
 from mcap_landmarks_generator.layout import PlacedObject, built, place
 from mcap_landmarks_generator.loading import LoadedScenario
 from mcap_landmarks_generator.scenario import Scenario
-from mcap_landmarks_generator.toml_lines import Location
+from mcap_landmarks_generator.toml_lines import KeyPath
 
 Floats = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ def _check_way(loaded: LoadedScenario, staged: Staged) -> None:
     start = staged.start[:2]
     blocking = _blocking(start, start, staged.objects, ROBOT_RADIUS_M)
     if blocking is not None:
-        where: Location = ("robot", "start") if staged.scenario.robot.start else ("trajectory", "waypoints", 0)
+        where: KeyPath = ("robot", "start") if staged.scenario.robot.start else ("trajectory", "waypoints", 0)
         raise loaded.fault(where, f"the robot would start inside {blocking.object_id}; move one of them")
     points = [start, *(np.array(point.at) for point in staged.scenario.trajectory.waypoints)]
     for i, (here, there) in enumerate(pairwise(points)):

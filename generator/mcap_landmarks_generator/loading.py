@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from mcap_landmarks_generator.bundled import FOLDER, bundled
 from mcap_landmarks_generator.scenario import ADAPTER, Scenario
-from mcap_landmarks_generator.toml_lines import Location, lines_of
+from mcap_landmarks_generator.toml_lines import KeyPath, lines_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,11 +20,11 @@ class LoadedScenario:
 
     name: str
     scenario: Scenario
-    origins: Mapping[Location, str]
+    origins: Mapping[KeyPath, str]
 
-    def fault(self, location: Location, problem: str) -> ToolkitError:
-        """The error that says where the value at `location` was written and what is wrong with it."""
-        return ToolkitError(f"{_origin(self.origins, self.name, location)}: {problem}")
+    def fault(self, key_path: KeyPath, problem: str) -> ToolkitError:
+        """The error that says where the value at `key_path` was written and what is wrong with it."""
+        return ToolkitError(f"{_origin(self.origins, self.name, key_path)}: {problem}")
 
 
 def load_scenario(name: str, settings: Sequence[str] = (), seed: int | None = None) -> LoadedScenario:
@@ -62,14 +62,14 @@ def _path(name: str, beside: Path) -> Path:
     raise UsageError(f"{name}: there is no such scenario file, and none of that name is bundled; {hint}")
 
 
-def _read(path: Path, above: tuple[Path, ...]) -> tuple[dict[str, object], dict[Location, str]]:
+def _read(path: Path, above: tuple[Path, ...]) -> tuple[dict[str, object], dict[KeyPath, str]]:
     """Content of a file over that of the one it extends, and the origin `file:line` of each value."""
     try:
         text = path.read_text()
         content = tomllib.loads(text)
     except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ToolkitError(f"{path}: not a TOML file: {error}") from error
-    origins = {location: f"{path}:{line}" for location, line in lines_of(text).items()}
+    origins = {key_path: f"{path}:{line}" for key_path, line in lines_of(text).items()}
     base_name = content.pop("extends", None)
     if base_name is None:
         return content, origins
@@ -84,26 +84,26 @@ def _read(path: Path, above: tuple[Path, ...]) -> tuple[dict[str, object], dict[
 
 def _merge(
     base: dict[str, object],
-    base_origins: dict[Location, str],
+    base_origins: dict[KeyPath, str],
     content: Mapping[str, object],
-    origins: Mapping[Location, str],
-    inside: Location,
+    origins: Mapping[KeyPath, str],
+    inside: KeyPath,
 ) -> dict[str, object]:
     """`base` with `content` over it: tables are joined, all else is replaced; the origins in place."""
     for key, value in content.items():
-        location = (*inside, key)
+        key_path = (*inside, key)
         below = base.get(key)
         if isinstance(value, dict) and isinstance(below, dict):
-            _merge(below, base_origins, value, origins, location)
+            _merge(below, base_origins, value, origins, key_path)
             continue
         base[key] = value
-        for old in [place for place in base_origins if place[: len(location)] == location]:
+        for old in [place for place in base_origins if place[: len(key_path)] == key_path]:
             del base_origins[old]
-        base_origins.update({k: v for k, v in origins.items() if k[: len(location)] == location})
+        base_origins.update({k: v for k, v in origins.items() if k[: len(key_path)] == key_path})
     return base
 
 
-def _set(content: dict[str, object], origins: dict[Location, str], text: str) -> None:
+def _set(content: dict[str, object], origins: dict[KeyPath, str], text: str) -> None:
     name, equals, value = text.partition("=")
     keys = name.split(".")
     if not equals or not all(keys):
@@ -118,23 +118,23 @@ def _set(content: dict[str, object], origins: dict[Location, str], text: str) ->
     _merge(content, origins, change, {tuple(keys): f"--set {text}"}, ())
 
 
-def _first_fault(error: ValidationError, origins: Mapping[Location, str], path: Path) -> ToolkitError:
+def _first_fault(error: ValidationError, origins: Mapping[KeyPath, str], path: Path) -> ToolkitError:
     first = error.errors(include_url=False)[0]
-    location: Location = tuple(first["loc"])
+    key_path: KeyPath = tuple(first["loc"])
     if first["type"] == "unexpected_keyword_argument":
-        problem = f"unknown key {location[-1]}"
+        problem = f"unknown key {key_path[-1]}"
     elif first["type"] == "missing":
-        problem = f"the key {location[-1]} is missing"
+        problem = f"the key {key_path[-1]} is missing"
     else:
         message = first["msg"].removeprefix("Value error, ").removeprefix("Input ")
-        problem = f"{'.'.join(str(part) for part in location)} = {first['input']!r}: {message}"
-    origin = _origin(origins, str(path), location)
+        problem = f"{'.'.join(str(part) for part in key_path)} = {first['input']!r}: {message}"
+    origin = _origin(origins, str(path), key_path)
     return UsageError(f"{origin}: {problem}") if origin.startswith("--set") else ToolkitError(f"{origin}: {problem}")
 
 
-def _origin(origins: Mapping[Location, str], default: str, location: Location) -> str:
-    """Origin of the innermost known place around a location."""
-    for length in range(len(location), 0, -1):
-        if location[:length] in origins:
-            return origins[location[:length]]
+def _origin(origins: Mapping[KeyPath, str], default: str, key_path: KeyPath) -> str:
+    """Origin of the innermost known place around a key path."""
+    for length in range(len(key_path), 0, -1):
+        if key_path[:length] in origins:
+            return origins[key_path[:length]]
     return default

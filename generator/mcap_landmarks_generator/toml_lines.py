@@ -2,13 +2,13 @@
 
 from collections import Counter
 
-Location = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 
-def lines_of(text: str) -> dict[Location, int]:
+def lines_of(text: str) -> dict[KeyPath, int]:
     """Line number, from 1, of every table, key and array element of a valid TOML text.
 
-    The location of `b` in the second `[[a]]` is ("a", 1, "b").
+    The key path of `b` in the second `[[a]]` is ("a", 1, "b").
     """
     return _Scanner(text).scan()
 
@@ -19,11 +19,11 @@ class _Scanner:
     def __init__(self, text: str) -> None:
         self._text = text
         self._at = 0
-        self._found: dict[Location, int] = {}
-        self._table: Location = ()
-        self._counts: Counter[Location] = Counter()
+        self._found: dict[KeyPath, int] = {}
+        self._table: KeyPath = ()
+        self._counts: Counter[KeyPath] = Counter()
 
-    def scan(self) -> dict[Location, int]:
+    def scan(self) -> dict[KeyPath, int]:
         while self._skip_blank():
             if self._text[self._at] == "[":
                 self._header()
@@ -31,9 +31,9 @@ class _Scanner:
                 self._pair(self._table)
         return self._found
 
-    def _note(self, location: Location) -> None:
-        for length in range(1, len(location) + 1):
-            self._found.setdefault(location[:length], self._text.count("\n", 0, self._at) + 1)
+    def _note(self, key_path: KeyPath) -> None:
+        for length in range(1, len(key_path) + 1):
+            self._found.setdefault(key_path[:length], self._text.count("\n", 0, self._at) + 1)
 
     def _skip_blank(self) -> bool:
         """Pass spaces, newlines, commas and comments; False at the end of the text."""
@@ -50,27 +50,27 @@ class _Scanner:
         """`[table]` or `[[array of tables]]`; in arrays of tables the latest element is meant."""
         is_array = self._text.startswith("[[", self._at)
         self._at += 1 + is_array
-        location: Location = ()
+        key_path: KeyPath = ()
         keys = self._keys("]")
         for i, key in enumerate(keys):
-            location = (*location, key)
+            key_path = (*key_path, key)
             last = i == len(keys) - 1
             if last and is_array:
-                self._counts[location] += 1
-            if location in self._counts:
-                location = (*location, self._counts[location] - 1)
-        self._table = location
-        self._note(location)
+                self._counts[key_path] += 1
+            if key_path in self._counts:
+                key_path = (*key_path, self._counts[key_path] - 1)
+        self._table = key_path
+        self._note(key_path)
         self._at += is_array
 
-    def _pair(self, inside: Location) -> None:
+    def _pair(self, inside: KeyPath) -> None:
         """`key = value`, also with a dotted key."""
         start = self._at
-        location = (*inside, *self._keys("="))
+        key_path = (*inside, *self._keys("="))
         here, self._at = self._at, start
-        self._note(location)
+        self._note(key_path)
         self._at = here
-        self._value(location)
+        self._value(key_path)
 
     def _keys(self, end: str) -> list[str]:
         """The parts of a dotted key up to the character `end`, which is passed."""
@@ -90,33 +90,33 @@ class _Scanner:
         self._at += 1
         return parts
 
-    def _value(self, location: Location) -> None:
+    def _value(self, key_path: KeyPath) -> None:
         while self._text[self._at] in " \t":
             self._at += 1
         character = self._text[self._at]
         if character == "[":
-            self._array(location)
+            self._array(key_path)
         elif character == "{":
-            self._inline_table(location)
+            self._inline_table(key_path)
         elif character in "\"'":
             self._string()
         else:
             while self._at < len(self._text) and self._text[self._at] not in ",]}\n#":
                 self._at += 1
 
-    def _array(self, location: Location) -> None:
+    def _array(self, key_path: KeyPath) -> None:
         self._at += 1
         index = 0
         while self._skip_blank() and self._text[self._at] != "]":
-            self._note((*location, index))
-            self._value((*location, index))
+            self._note((*key_path, index))
+            self._value((*key_path, index))
             index += 1
         self._at += 1
 
-    def _inline_table(self, location: Location) -> None:
+    def _inline_table(self, key_path: KeyPath) -> None:
         self._at += 1
         while self._skip_blank() and self._text[self._at] != "}":
-            self._pair(location)
+            self._pair(key_path)
         self._at += 1
 
     def _string(self) -> None:
