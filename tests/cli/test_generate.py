@@ -108,7 +108,7 @@ def test_without_pybullet_it_says_what_to_install(
             raise ModuleNotFoundError("No module named 'pybullet'", name="pybullet")
         return real_import(name, *arguments)  # type: ignore[arg-type]
 
-    for module in [name for name in sys.modules if name == "pybullet" or name.startswith("generator")]:
+    for module in [name for name in sys.modules if name == "pybullet" or name.startswith("mcap_landmarks_generator")]:
         monkeypatch.delitem(sys.modules, module)
     monkeypatch.setattr(builtins, "__import__", no_pybullet)
     assert run(scene, "-o", scene.with_name("log.mcap")) == UNUSABLE
