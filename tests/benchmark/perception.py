@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tests.benchmark import fusion
+from tests.benchmark import spoilt_detections
 from tests.benchmark.centres import FARTHEST_M, Errors, judge, within
 from tests.benchmark.rows import Row, main
 
@@ -34,7 +34,7 @@ LIMITS_M = {
 def measure(quick: bool) -> Iterator[Row]:
     """All rows."""
     yield from centres(120 if quick else 600)
-    yield from fusion.rows(quick)
+    yield from spoilt_detections.rows(quick)
 
 
 def centres(count: int) -> Iterator[Row]:

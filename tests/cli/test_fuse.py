@@ -19,7 +19,7 @@ from mcap_landmarks.resources import resource
 from mcap_landmarks.stage import Channel, Stamped
 
 from tests.cli.logs import write
-from tests.stages.fusion import THREE, boxes, detected, information, mounted, moved, scanned
+from tests.fusion.cylinders import THREE, boxes, detected, information, mounted, moved, scanned
 
 SCHEMA: Any = json.loads(resource("schemas", "json/fuse.schema.json").read_text())
 SCAN_NS, IMAGE_NS, TURN_RADPS = 200_000_000, 100_000_000, 0.8

@@ -17,7 +17,7 @@ from mcap_landmarks.messages.typestore import typestore
 from mcap_landmarks.stage import Bundle, Stamped
 from mcap_landmarks.stages.fuse import process
 
-from tests.stages.fusion import (
+from tests.fusion.cylinders import (
     KNOWN,
     THREE,
     Thing,

@@ -8,7 +8,7 @@ from mcap_landmarks.channels import SCAN_OBJECTS
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.stage import Bundle, OdometryAt
 
-from tests.stages.fusion import THREE, Thing, boxes, bundle, detected, fused, scanned
+from tests.fusion.cylinders import THREE, Thing, boxes, bundle, detected, fused, scanned
 
 SECOND = 10**9
 NAMES = [thing.name for thing in THREE]

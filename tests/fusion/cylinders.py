@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, SCAN_OBJECTS, SCENE_OBJECTS, TF_STATIC
+from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.camera import CameraModel
@@ -77,6 +78,13 @@ def scanned(things: Sequence[Thing], stamp_ns: int, ids: Sequence[str] | None = 
         tuple(covariances),
         np.array([thing.radius_m for thing in things]),
     )
+
+
+def camera_view(camera_m: float = 0.2, velocity: Sequence[float] = (0.0, 0.0, 0.0), late_s: float = 0.0) -> CameraView:
+    """The camera, with an image taken so much later than the scan at a velocity of the base."""
+    model, step = CameraModel.of("", SIZE_PX, K, np.zeros(0)), mounted(camera_m).transforms[0]
+    base_from_camera = frames.rigid(step.translation_m, step.rotation_xyzw)
+    return CameraView.at(model, base_from_camera, np.asarray(velocity, dtype=np.float64), late_s)
 
 
 def boxes(things: Sequence[Thing], camera_m: float = 0.2, model: CameraModel | None = None) -> Array:
