@@ -60,7 +60,7 @@ class Intrinsics:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class Viewpoint:
     """From where to look: eye (3,), rotation world from optical (3, 3), time after the start."""
 
     eye_m: Floats
@@ -75,7 +75,7 @@ class ImageJob:
     index: int
     stamp_ns: int
     log_time_ns: int
-    view: View
+    view: Viewpoint
     turn_radps: float
 
 
@@ -107,6 +107,6 @@ class Camera:
             index=self._index,
             stamp_ns=stamp_ns,
             log_time_ns=stamp_ns + to_ns(self._spec.delay_s),
-            view=View(eye, world_from_base @ BASE_FROM_OPTICAL, time_ns / 1e9),
+            view=Viewpoint(eye, world_from_base @ BASE_FROM_OPTICAL, time_ns / 1e9),
             turn_radps=float(wrap(now - before)) / (_TURN_OVER_NS / 1e9),
         )

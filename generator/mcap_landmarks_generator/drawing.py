@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks_generator.assets.bullet import AssetStore, Body
-from mcap_landmarks_generator.camera import Intrinsics, View
+from mcap_landmarks_generator.camera import Intrinsics, Viewpoint
 from mcap_landmarks_generator.engine import pybullet
 from mcap_landmarks_generator.layout import PlacedObject
 from mcap_landmarks_generator.scenario import LightSpec
@@ -78,7 +78,7 @@ class Drawing:
                 pybullet.resetBasePositionAndOrientation(body.body_id, [x, y, 0.0], turn, physicsClientId=self._client)
         return [self._bodies[placed.object_id] for placed in objects]
 
-    def render(self, view: View, window: Window, scale: float) -> tuple[Image, NDArray[np.int32]]:
+    def render(self, view: Viewpoint, window: Window, scale: float) -> tuple[Image, NDArray[np.int32]]:
         """Colours (h, w, 3) and body ids (h, w), -1 for none, of a window at `scale` times the image's resolution.
 
         Where no object is, the colour is white.

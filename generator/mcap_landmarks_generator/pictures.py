@@ -12,7 +12,7 @@ from mcap_landmarks.stage import Stamped
 from numpy.typing import NDArray
 
 from mcap_landmarks_generator.bundled import bundled
-from mcap_landmarks_generator.camera import ImageJob, Intrinsics, View
+from mcap_landmarks_generator.camera import ImageJob, Intrinsics, Viewpoint
 from mcap_landmarks_generator.checks import Staged, stage
 from mcap_landmarks_generator.drawing import Image
 from mcap_landmarks_generator.lidar import beam_angles
@@ -103,7 +103,7 @@ def first_good_image(staged: Staged) -> Image:
     return rendered.image
 
 
-def _from_above(staged: Staged, eye: Floats, width_px: int, side_m: float) -> tuple[View, Image]:
+def _from_above(staged: Staged, eye: Floats, width_px: int, side_m: float) -> tuple[Viewpoint, Image]:
     """A square of ground around a point, seen from above."""
     view = _looking(eye, np.array([eye[0], eye[1], 0.0]), np.array([0.0, 1.0, 0.0]))
     camera = replace(
@@ -116,7 +116,7 @@ def _from_above(staged: Staged, eye: Floats, width_px: int, side_m: float) -> tu
         return view, renderer.draw(view).image
 
 
-def _projection(view: View, width_px: int, side_m: float) -> Callable[[Floats], Floats]:
+def _projection(view: Viewpoint, width_px: int, side_m: float) -> Callable[[Floats], Floats]:
     """Function from points (N, 2) on the ground to pixels (N, 2) of `_from_above`."""
     camera = Intrinsics(width_px, width_px, width_px / side_m * float(view.eye_m[2]))
 
@@ -127,11 +127,11 @@ def _projection(view: View, width_px: int, side_m: float) -> Callable[[Floats], 
     return pixel_from
 
 
-def _looking(eye: Floats, target: Floats, upwards: Floats) -> View:
+def _looking(eye: Floats, target: Floats, upwards: Floats) -> Viewpoint:
     forwards = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(forwards, upwards)
     right /= np.linalg.norm(right)
-    return View(eye, np.column_stack([right, np.cross(forwards, right), forwards]), 0.0)
+    return Viewpoint(eye, np.column_stack([right, np.cross(forwards, right), forwards]), 0.0)
 
 
 def _line(image: Image, pixels: Floats, colour: Sequence[int]) -> None:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from mcap_landmarks_generator.assets import ground, sky
 from mcap_landmarks_generator.assets.backdrop import Backdrop, Shadow, cast_shadow
 from mcap_landmarks_generator.assets.bullet import Body
-from mcap_landmarks_generator.camera import Intrinsics, View
+from mcap_landmarks_generator.camera import Intrinsics, Viewpoint
 from mcap_landmarks_generator.drawing import NEAR_M, Drawing, Image, Window
 from mcap_landmarks_generator.layout import PlacedObject
 from mcap_landmarks_generator.scenario import Scenario
@@ -95,7 +95,7 @@ class Renderer:
         """Width and height of the image."""
         return self._intrinsics.width_px, self._intrinsics.height_px
 
-    def draw(self, view: View) -> Rendered:
+    def draw(self, view: Viewpoint) -> Rendered:
         """The image of a view."""
         in_view = self._in_view(view)
         image = self._backdrop.view(
@@ -116,7 +116,7 @@ class Renderer:
         _lay_over(image, window, colours, body_ids >= 0)
         return Rendered(image, body_ids, window, visible)
 
-    def silhouette_px(self, view: View, one: Visible) -> float:
+    def silhouette_px(self, view: Viewpoint, one: Visible) -> float:
         """Area in pixels of the image of an object's labelled parts, were none hidden by an object or the edge."""
         area_px = one.window.width * one.window.height
         scale = SUPERSAMPLING * min(1.0, float(np.sqrt(_SILHOUETTE_AREA_PX / area_px)))
@@ -125,7 +125,7 @@ class Renderer:
         labelled = np.isin(body_ids, [body.body_id for body in bodies if body.labelled])
         return float(labelled.mean()) * area_px
 
-    def _in_view(self, view: View) -> list[tuple[PlacedObject, Window]]:
+    def _in_view(self, view: Viewpoint) -> list[tuple[PlacedObject, Window]]:
         """Objects within reach whose bounding box meets the image, with the window that holds the box."""
         away = self._centres - view.eye_m[:2]
         ahead = away @ view.world_from_optical[:2, 2] > -self._reach_m
@@ -139,7 +139,7 @@ class Renderer:
                 found.append((placed, window))
         return found
 
-    def _window(self, view: View, corners: Floats, pose: Floats) -> Window | None:
+    def _window(self, view: Viewpoint, corners: Floats, pose: Floats) -> Window | None:
         """The window around an object's bounding box (8, 3) at a pose; None if it lies outside the image."""
         c, s = np.cos(pose[2]), np.sin(pose[2])
         world = corners @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + [pose[0], pose[1], 0.0]
@@ -169,7 +169,7 @@ class Renderer:
             min(height, max(window.bottom for window in windows)),
         )
 
-    def _shadows_in(self, view: View, objects: Sequence[PlacedObject]) -> list[Shadow]:
+    def _shadows_in(self, view: Viewpoint, objects: Sequence[PlacedObject]) -> list[Shadow]:
         """Shadows of the objects that are near; those of objects that stand still are cast once."""
         shadows = []
         for placed in objects:
@@ -185,7 +185,7 @@ class Renderer:
         return shadows
 
 
-def _visible(view: View, placed: PlacedObject, bodies: tuple[Body, ...], window: Window) -> Visible:
+def _visible(view: Viewpoint, placed: PlacedObject, bodies: tuple[Body, ...], window: Window) -> Visible:
     distance = float(np.hypot(*(placed.pose_at(view.time_s)[:2] - view.eye_m[:2])))
     reach = placed.asset.footprint_radius_m
     return Visible(placed, bodies, window, distance - reach, distance + reach)

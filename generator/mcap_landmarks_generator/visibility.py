@@ -7,14 +7,14 @@ import numpy as np
 from mcap_landmarks.messages.detections import Detections
 
 from mcap_landmarks_generator.assets.catalog import COCO_ID
-from mcap_landmarks_generator.camera import View
+from mcap_landmarks_generator.camera import Viewpoint
 from mcap_landmarks_generator.renderer import SUPERSAMPLING, Rendered, Renderer, Visible
 from mcap_landmarks_generator.robot import OPTICAL_FRAME
 
 _LEAST_AREA_PX = 4.0
 
 
-def true_detections(rendered: Rendered, renderer: Renderer, view: View, stamp_ns: int) -> Detections:
+def true_detections(rendered: Rendered, renderer: Renderer, view: Viewpoint, stamp_ns: int) -> Detections:
     """Box of the visible labelled parts of each object, from the mask; the score is the visible share of them.
 
     The share counts what other objects and the image's edges hide. Objects are left out that show less than 4 pixels.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.transforms import TFMessage
-from mcap_landmarks_generator.camera import Intrinsics, View
+from mcap_landmarks_generator.camera import Intrinsics, Viewpoint
 from mcap_landmarks_generator.checks import Staged, stage
 from mcap_landmarks_generator.loading import load_scenario
 from mcap_landmarks_generator.optics import Optics
@@ -43,13 +43,13 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Staged, Re
         yield staged, renderer
 
 
-def view_from(x: float, y: float, heading_deg: float) -> View:
+def view_from(x: float, y: float, heading_deg: float) -> Viewpoint:
     c, s = np.cos(np.deg2rad(heading_deg)), np.sin(np.deg2rad(heading_deg))
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    return View(turn @ CAMERA_IN_BASE_M + [x, y, 0.0], turn @ BASE_FROM_OPTICAL, 0.0)
+    return Viewpoint(turn @ CAMERA_IN_BASE_M + [x, y, 0.0], turn @ BASE_FROM_OPTICAL, 0.0)
 
 
-def detections_from(scene: tuple[Staged, Renderer], view: View) -> dict[str, tuple[Floats, float]]:
+def detections_from(scene: tuple[Staged, Renderer], view: Viewpoint) -> dict[str, tuple[Floats, float]]:
     """Box and visible share by object id."""
     found: Detections = true_detections(scene[1].draw(view), scene[1], view, 0)
     shares = [options[0][1] for options in found.hypotheses]
@@ -194,7 +194,7 @@ def test_objects_that_walk_are_seen_where_they_are(stage_text: StageText) -> Non
     with Renderer(staged.scenario, staged.objects) as renderer:
         centres = []
         for time_s in (0.0, 1.0, 4.0, 6.0):
-            view = View(start.eye_m, start.world_from_optical, time_s)
+            view = Viewpoint(start.eye_m, start.world_from_optical, time_s)
             box = true_detections(renderer.draw(view), renderer, view, 0).boxes_xyxy[0]
             centres.append((box[0] + box[2]) / 2)
     expected = 320 - 530.5 * np.array([2.0, 1.0, -2.0, 0.0]) / (6.0 - CAMERA_IN_BASE_M[0])

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks_generator import layout
 from mcap_landmarks_generator.assets import catalog, ground, sky
-from mcap_landmarks_generator.camera import View
+from mcap_landmarks_generator.camera import Viewpoint
 from mcap_landmarks_generator.layout import PlacedObject, place
 from mcap_landmarks_generator.robot import BASE_FROM_OPTICAL, CAMERA_IN_BASE_M
 from mcap_landmarks_generator.scenario import BackgroundSpec, GroundSpec, LightSpec, ObjectSpec, Scenario
@@ -60,7 +60,7 @@ class Scene:
 
     scenario: Scenario
     objects: tuple[PlacedObject, ...]
-    views: tuple[View, ...]
+    views: tuple[Viewpoint, ...]
 
 
 def scene(recipe: Recipe, seed: int, index: int) -> Scene:
@@ -148,7 +148,7 @@ def _free(
     return None
 
 
-def _view(objects: tuple[PlacedObject, ...], handheld: bool, rng: np.random.Generator) -> View:
+def _view(objects: tuple[PlacedObject, ...], handheld: bool, rng: np.random.Generator) -> Viewpoint:
     """A view from beside everything, towards one of the objects more or less."""
     taken = [(one.route_xy[0], one.asset.footprint_radius_m) for one in objects]
     spot = _free(lambda: _in_disc(rng), taken, _NEAREST_M)
@@ -166,7 +166,7 @@ def _view(objects: tuple[PlacedObject, ...], handheld: bool, rng: np.random.Gene
         pitch = rng.normal(0, 0.03) + rng.uniform(0, 0.12) * height
         roll = rng.normal(0, 0.03)
     world_from_base = _turn(2, heading) @ _turn(1, pitch) @ _turn(0, roll)
-    return View(np.array([*spot, height]), world_from_base @ BASE_FROM_OPTICAL, 0.0)
+    return Viewpoint(np.array([*spot, height]), world_from_base @ BASE_FROM_OPTICAL, 0.0)
 
 
 def _turn(axis: int, angle_rad: float) -> NDArray[np.float64]:

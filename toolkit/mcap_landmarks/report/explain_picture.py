@@ -9,14 +9,14 @@ from matplotlib.patches import Rectangle
 
 from mcap_landmarks.evaluation.explain import Place, Situation
 from mcap_landmarks.geometry.se2 import Array, transform_points
-from mcap_landmarks.report.explain_reading import View
+from mcap_landmarks.report.explain_reading import SensorData
 
 _GREY, _OBJECT, _CLUSTER, _BOX = "#9CA3AF", "#D55E00", "#0072B2", "#FACC15"
 _PLACES = ("#111827", "#7E22CE", "#047857", "#B45309", "#1D4ED8")
 _AROUND_M = 6.0
 
 
-def explanation_figure(situation: Situation, places: tuple[Place, ...], view: View, title: str = "") -> Figure:
+def explanation_figure(situation: Situation, places: tuple[Place, ...], view: SensorData, title: str = "") -> Figure:
     """As many panels as there is something to show: at least the objects around the robot."""
     maps = situation.landmarks is not None and any(place.pose is not None for place in places)
     count = 1 + (view.image is not None) + maps
@@ -48,7 +48,7 @@ def _draw_image(axes: Axes, situation: Situation, image: Any) -> None:  # noqa: 
             axes.annotate(text, (x1, y1), (0, 2), textcoords="offset points", fontsize=7, color=_BOX)
 
 
-def _draw_objects(axes: Axes, situation: Situation, view: View) -> None:
+def _draw_objects(axes: Axes, situation: Situation, view: SensorData) -> None:
     """Points, clusters and objects in the base frame, x ahead."""
     if view.scan_xy is not None:
         axes.plot(*view.scan_xy.T, ".", color=_GREY, markersize=2.5, label="scan")

@@ -45,14 +45,14 @@ _BESIDE = (DETECTIONS, CAMERA_IMAGE, SCAN)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class View:
+class SensorData:
     """What the sensors saw: the image (H, W, 3) of the detections, and the scan as points (N, 2) in the base frame."""
 
     image: NDArray[np.uint8] | None = None
     scan_xy: Array | None = None
 
 
-def read_situation(path: Location, at_ns: int) -> tuple[Situation, View]:
+def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
     """The bundle of a log that is nearest in time, and what its sensors saw.
 
     Raises:
@@ -106,7 +106,7 @@ def _schema(connection: Connection) -> str:
     return connection.schema.decode(errors="replace")
 
 
-def _view(recording: Recording, found: dict[Channel[Any], dict[int, Any]], stamp_ns: int) -> View:
+def _view(recording: Recording, found: dict[Channel[Any], dict[int, Any]], stamp_ns: int) -> SensorData:
     detections = _nearest(found[DETECTIONS], stamp_ns)
     image = _nearest(found[CAMERA_IMAGE], stamp_ns if detections is None else detections.stamp_ns)
     pixels = None
@@ -116,8 +116,8 @@ def _view(recording: Recording, found: dict[Channel[Any], dict[int, Any]], stamp
     scene = found[SCENE_OBJECTS].get(stamp_ns)
     scan = found[SCAN].get(stamp_ns)
     if scan is None or scene is None:
-        return View(pixels)
-    return View(pixels, _points(recording, scan, scene.frame_id))
+        return SensorData(pixels)
+    return SensorData(pixels, _points(recording, scan, scene.frame_id))
 
 
 def _points(recording: Recording, scan: LaserScan, base: str) -> Array:
