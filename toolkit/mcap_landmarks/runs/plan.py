@@ -1,15 +1,6 @@
 """What each stage of a run will be made from: its configuration, its files, what it reads; known before it runs.
 
-A setting on its way, `--set fuse.bearing_gate=4`:
-
-1. `cli.option_groups.LogOptions.settings` has the text, and `cli.stage_runs.Given.requests` gives it to
-2. `config.gather`, which makes it `{"fuse": {"bearing_gate": 4}}` and checks it against the dataclass of the stage's
-   declaration, `stages.fuse.STAGE.config`;
-3. `Request.settings` carries it to `plan`, below, which asks
-4. `config.load_files` for a `FuseConfig` with it, and puts that into the `Step` and into the record whose key says
-   which results can be reused;
-5. `runs.session.Session.work` takes the step's results from where they lie, or calls
-6. `runs.stage_runner.run_stage`, which calls `stages.fuse.process` with the log's bundles and `Step.config`.
+CONTRIBUTING.md follows a setting from the command line through `plan` to its stage.
 """
 
 from collections.abc import Mapping, Sequence
