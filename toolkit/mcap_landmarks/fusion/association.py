@@ -17,14 +17,18 @@ from mcap_landmarks.messages.scan_objects import ScanObjects
 Pair = tuple[int, int]
 
 _NEVER = 1e6
+"""The cost of what cannot be: more than all else together."""
 _UNSEEN_PER_RAD = 0.3
-"""Boxes of a class, per image and radian, of what is too far away, too thin or hidden for the LiDAR."""
+"""Boxes of a class, per image and radian, of what is too far away, too thin or hidden for the LiDAR. The generator's
+log `cluttered` (seed 3) has 0.21 on the mean of its classes, 0.57 of persons and chairs."""
 _ASIDE, _UPRIGHT = 1.3, 2.0
-"""How much more chi-squares of bearing and size tell than sigmas say, which are wide for gates."""
+"""How much more chi-squares of bearing and size tell than sigmas say, which are wide for gates. By the errors in that
+log, with boxes spoilt by 1 px and 3 % of their size, it could be 2.3 and 7; real boxes err more."""
 _LEAST_FIT = 0.05
-"""Real objects differ from the shapes of their class, so that a scan never speaks more against it."""
+"""Real objects differ from the shapes of their class, so that a scan never speaks more against it; in that log 98 % fit
+twice as well."""
 _USUAL_FIT = 0.5
-"""How well the scan fits a class where it does not speak for it or against it."""
+"""How well the scan fits a class where it does not speak for it or against it; in that log the median is 0.47."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,12 +12,21 @@ from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array, transform_points
 
 OFF_MIDDLE = 0.2
-"""How far off the middle of its box an object stands, as a share of half the width: arms, poses, hidden sides."""
+"""How far off the middle of its box an object stands, as a share of half the width: arms, poses, hidden sides. In the
+generator's log `cluttered` (seed 3) the RMS is 0.11 for objects that nothing hides, 0.25 for all."""
 _EDGE_MARGIN_PX = 2.5
-_DEPTH_M = 0.05
+"""Edges so near the image's are cut by it: a little more than `edge_px`, the default of what edges are sure to."""
+_MEASURED_M = 0.05
+"""Heights and widths are sure to so much at best: ground is uneven, and a robot pitches by a degree or so."""
 _NARROWED, _HEIGHT_SPREAD = 0.35, 0.07
+"""What hides an object narrows it by such a share, and sizes go beyond their usual range by such a share (statures of
+adults have standard deviations of 4 %); standard deviations."""
 _HIDDEN_FOOT_M = 0.25
-"""An object's foot may be hidden by what stands before it, so high, give or take."""
+"""What stands before an object, such as a kerb or a bag, hides its foot so high; a standard deviation."""
+_BOTH_EDGES = 1.4
+"""The square root of two, about: errors of two edges add up."""
+_AT_LEAST_M = 0.05
+"""No object is nearer to the camera, which divides by that."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,7 +90,7 @@ def misfits(
     height and width.
     """
     places = view.from_camera(centres[0])
-    distance = np.maximum(np.hypot(places[:, 0], places[:, 1]), 0.05)
+    distance = np.maximum(np.hypot(places[:, 0], places[:, 1]), _AT_LEAST_M)
     across = np.stack([-places[:, 1], places[:, 0]], axis=1) / distance[:, None]
     turned = transform_points(np.array([0.0, 0.0, float(view.scan_from_image[2])]), across)
     spread = np.einsum("ni,nij,nj->n", turned, centres[1], turned)
@@ -116,11 +125,11 @@ def _sideways(
 def _upright(boxes: BoxGeometry, box: int, distance: Array, camera_m: float, size: Size) -> Array:
     """Chi-squares (N,) of what an object at distances (N,) in a box would measure, against a size."""
     left_cut, top_cut, right_cut, bottom_cut = boxes.cut[box].tolist()
-    unsure = np.hypot(distance * boxes.sigma_slope[box], _DEPTH_M)
+    unsure = np.hypot(distance * boxes.sigma_slope[box], _MEASURED_M)
     top = camera_m + distance * boxes.top[box]
     foot = camera_m + distance * boxes.bottom[box]
     width = 2 * distance * np.tan(boxes.half[box])
-    blurred = np.hypot(2 * distance * boxes.sigma_rad[box], _DEPTH_M)
+    blurred = np.hypot(2 * distance * boxes.sigma_rad[box], _MEASURED_M)
     total = _over(top, size.top_m[1], unsure + _HEIGHT_SPREAD * size.top_m[1]) + _over(width, size.width_m[1], blurred)
     if not top_cut:
         total = total + _over(size.top_m[0], top, unsure + _HEIGHT_SPREAD * size.top_m[0])
@@ -128,7 +137,8 @@ def _upright(boxes: BoxGeometry, box: int, distance: Array, camera_m: float, siz
         total = total + _over(size.foot_m[0], foot, unsure)
     if not (top_cut or bottom_cut):
         least, most = size.tall_m
-        total = total + _over(top - foot, most, 1.4 * unsure) + _over(least, top - foot, 1.4 * unsure + _HIDDEN_FOOT_M)
+        both = _BOTH_EDGES * unsure
+        total = total + _over(top - foot, most, both) + _over(least, top - foot, both + _HIDDEN_FOOT_M)
     total = total + _over(foot, size.foot_m[1], unsure + _HIDDEN_FOOT_M)
     if not (left_cut or right_cut):
         total = total + _over(size.width_m[0], width, blurred + _NARROWED * size.width_m[0])

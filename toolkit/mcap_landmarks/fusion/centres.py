@@ -14,10 +14,14 @@ SURFACE = ""
 """The hypothesis of no known shape: the middle of the near surface."""
 
 RESOLVED = 0.01
-"""A shape that fits a cluster worse has no centre that counts: hits of several things have run together."""
-
+"""A shape that fits a cluster worse has no centre that counts: hits of several things have run together. Of objects in
+the generator's log `cluttered` (seed 3) 98 % fit ten times better."""
 _LEAST_FIT = 1e-3
+"""What no shape of a class explains fits it by so much: less than what counts, and more than nothing."""
 _RADIUS_ERROR = 0.3
+"""Radii that come from boxes and classes are sure to such a share: an object's section may be of any form."""
+_WIDEST_SINE = 0.9
+"""Of the half angle of a box: a disc that fills a wider one would have its centre on the camera."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +78,7 @@ def radii_in_boxes(objects: ScanObjects, view: CameraView, boxes: BoxGeometry, b
     """Radii (N,) of discs that have the objects' surfaces in front and fill the width of one box."""
     surfaces = np.array([positions[-1] for positions in objects.positions_xy]).reshape(-1, 2)
     distance = np.hypot(*view.from_camera(surfaces).T)
-    sine = min(float(np.sin(boxes.half[box])), 0.9)
+    sine = min(float(np.sin(boxes.half[box])), _WIDEST_SINE)
     radii: Array = np.minimum(distance * sine / (1 - sine), size.width_m[1] / 2)
     return radii
 

@@ -6,6 +6,10 @@ from dataclasses import dataclass, field
 from mcap_landmarks.fusion.config import FuseConfig
 
 _REMEMBERED, _TOO_FAR_ASIDE = 5, 4.0
+"""Over how many detections `aside` is averaged, and how many sigmas of that average are too many: one track in 16,000
+would be so far off by chance."""
+_RADIUS_GAIN = 0.3
+"""What a new radius counts in the average, which so forgets one half of what was two boxes ago."""
 
 
 @dataclass(slots=True)
@@ -60,9 +64,9 @@ class ClassBelief:
         self._limit()
 
     def measure(self, name: str, radius_m: float) -> None:
-        """A box of a class had the width of a disc of a radius; the last three count about as much as all before."""
+        """A box of a class had the width of a disc of a radius; radii are averaged, later ones count for more."""
         before = self.radii_m.get(name, radius_m)
-        self.radii_m[name] = 0.7 * before + 0.3 * radius_m
+        self.radii_m[name] = (1 - _RADIUS_GAIN) * before + _RADIUS_GAIN * radius_m
 
     def _limit(self) -> None:
         """Keep what is said for and against the track within bounds."""

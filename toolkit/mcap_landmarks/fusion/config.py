@@ -9,6 +9,7 @@ from pydantic import Field
 from mcap_landmarks.classes import ANY_SIZE, CLASSES, Positive, Size
 
 Share = Annotated[float, Field(ge=0, le=1)]
+Factor = Annotated[float, Field(gt=0, le=1)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +45,8 @@ class FuseConfig:
     prior_odds: Positive = 0.03
     prior_odds_alone: Positive = 0.3
     hit_odds: Positive = 200.0
-    confusion: Share = 0.05
-    miss_odds: Share = 0.2
+    confusion: Factor = 0.05
+    miss_odds: Factor = 0.2
     max_odds: Positive = 1e3
     min_height_px: Positive = 20.0
     rectified: bool = False

@@ -8,6 +8,7 @@ from mcap_landmarks.geometry.se2 import Array, transform_points
 from mcap_landmarks.messages.scan_objects import ScanObjects
 
 _MOVED_M = 0.3
+"""How far beyond a track's radius a part of it may be: it stirs, and odometry drifts while it is not seen."""
 
 
 def inherit(tracks: Tracks, objects: ScanObjects, odom_from_base: Array) -> None:

@@ -7,6 +7,7 @@ from mcap_landmarks.messages.markers import Marker, MarkerArray, Shape
 from mcap_landmarks.messages.scene import SceneObjects
 
 _HEIGHT_M, _SMALLEST_M, _LETTERS_M = 0.5, 0.1, 0.25
+"""What can be seen in a view of some 10 m."""
 
 
 def markers_from_scene(scene: SceneObjects) -> MarkerArray:

@@ -12,8 +12,10 @@ from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
 
 _LEAST_TOLD = 0.005
+"""Classes less probable are not told: markers show whole percents."""
 _APART = 1.25
-"""Two objects of one class are farther apart than this many of its radii."""
+"""Two objects of one class are farther apart than this many of its radii; two discs that touch would be two apart, and
+centres err."""
 
 
 class _Found(NamedTuple):

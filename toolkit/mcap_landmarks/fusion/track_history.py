@@ -13,11 +13,20 @@ from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array, compose, transform_points
 
 _BOXES, _PLACES = 40, 600
+"""How many are kept: boxes count only from another place each, places are a minute's at ten scans a second."""
 _BEARING_RAD, _OFF_CENTRE = 0.01, 0.15
+"""Standard deviations of a direction in the odometry frame, which drifts between two looks, and of where a track is, as
+a share of its class's radius: shapes of a class differ."""
 _ASIDE, _TALLER = 2.65, 1.25
+"""How many sigmas off a box's middle a track can be, the root of the default of `bearing_gate`; and how many times
+taller or smaller than its class has it."""
 _ROUNDED_M = 1e-6
+"""More than rounding moves a place."""
 _FEW = 0.15
-"""A share of boxes so small need not be explained: some have a wrong class, or are of something else again."""
+"""A share of boxes so small need not be explained: some have a wrong class, or are of something else again. The
+poor detector of `tests.benchmark.perception` misnames 5 % of its boxes, and sees one thing too many in every image."""
+_LEAST_M = 0.1
+"""No track is nearer to the camera, which divides by that."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,7 +68,7 @@ def _reach(sigma_rad: float, tall: float, size: Size) -> tuple[float, float]:
     if not tall:
         return 0.0, np.inf
     near, far = (height_m / abs(tall) for height_m in _tall_span(size))
-    widest = _ASIDE * np.hypot(sigma_rad, _OFF_CENTRE * size.radius_m / max(near, 0.1))
+    widest = _ASIDE * np.hypot(sigma_rad, _OFF_CENTRE * size.radius_m / max(near, _LEAST_M))
     middle, ends = (near + far) / 2, np.array([near, far])
     chords = np.sqrt(ends**2 + middle**2 - 2 * middle * ends * np.cos(min(widest, np.pi)))
     return middle, float(chords.max()) + _ROUNDED_M
@@ -100,7 +109,7 @@ class TrackHistory:
         x, y = np.array([self.places.get(box.bundle, latest) - box.camera_xy for box in boxes]).T
         bearing, sigma, tall = np.array([(box.bearing_rad, box.sigma_rad, box.tall) for box in boxes]).T
         distance = np.hypot(x, y)
-        sigma = np.hypot(sigma, _OFF_CENTRE * size.radius_m / np.maximum(distance, 0.1))
+        sigma = np.hypot(sigma, _OFF_CENTRE * size.radius_m / np.maximum(distance, _LEAST_M))
         is_there = np.abs(wrap(np.arctan2(y, x) - bearing)) <= _ASIDE * sigma
         least, most = _tall_span(size)
         is_as_tall = (tall == 0) | ((least <= tall * distance) & (tall * distance <= most))

@@ -17,12 +17,18 @@ from mcap_landmarks.geometry.se2 import Array, transform_points
 from mcap_landmarks.messages.scan_objects import ScanObjects
 
 STALE = 0.15
-"""Images from nearly the same place say the same, and count so much at least."""
+"""Images from nearly the same place say the same, right or wrong, and count so much at least: seven as one."""
 _TURNED_RAD, _NEARER = 0.035, 0.1
-"""Seen so much from another side, or at a distance larger or smaller by such a share, is seen from another place."""
+"""Seen from another side by two degrees, or at a distance larger or smaller by such a share, is seen from another
+place: a box has moved or grown by more than it is sure to."""
 _KEPT_BUNDLES = 1000
+"""A track that scans do not show for longer is forgotten; at ten scans a second nearly twice what is remembered."""
 _REMEMBERED_NS = 60 * 10**9
+"""For so long a place holds: odometry of 1 to 2 % at a walking pace drifts by about a metre meanwhile."""
 _CELL_M = 4.0
+"""Side of a cell of the grid, about the reach of a box some metres away; it decides how fast tracks are found only."""
+_LEAST_M = 0.1
+"""Distances below are the same, since their logarithm counts."""
 
 
 @dataclass(slots=True)
@@ -47,7 +53,7 @@ class Track:
     def freshness(self, place_xy: Array, heading_rad: float) -> float:
         """How much an image says about the track, at a place (2,) in the base frame, that those before have not."""
         before = self.viewed
-        self.viewed = heading_rad + math.atan2(place_xy[1], place_xy[0]), math.log(max(np.hypot(*place_xy), 0.1))
+        self.viewed = heading_rad + math.atan2(place_xy[1], place_xy[0]), math.log(max(np.hypot(*place_xy), _LEAST_M))
         if before is None:
             return 1.0
         turned, nearer = abs(wrap(self.viewed[0] - before[0])), abs(self.viewed[1] - before[1])

@@ -19,19 +19,17 @@ from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.fuser import Fuser
 from mcap_landmarks.fusion.markers import markers_from_scene
+from mcap_landmarks.fusion.selection import at_least, usable, wanted
 from mcap_landmarks.fusion.thesis import fuse_in_order
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.scan_objects import ScanObjects
-from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.mounting import Mounting
 from mcap_landmarks.stage import Bundle, Omission, Stage, Stamped
 
 _UNEXPLAINED = "detections where the scan has no object that fits"
-_UNWANTED = "detections of {}, which is no landmark by the settings"
-_NO_BOX = "detections without a class or a box"
 _UNUSABLE = "scan objects without a finite place"
 
 
@@ -49,17 +47,16 @@ def process(
         found = bundle.get(SCAN_OBJECTS)
         if found is None:
             continue
-        objects, given, left_out = _usable(found), bundle.get(DETECTIONS), Counter[str]()
+        objects, given = usable(found), bundle.get(DETECTIONS)
         scans, images = scans + 1, images + (given is not None)
-        detections = None if given is None else _wanted(given, config, left_out)
+        detections, left_out = (None, Counter[str]()) if given is None else wanted(given, config)
         if config.method == "thesis":
             scene, unexplained = fuse_in_order(objects, detections, config.image_centre_px)
         else:
             view = None if detections is None else _view(bundle, detections, objects, mounting, config)
             odometry = None if bundle.odometry is None else bundle.odometry.odom_from_base
             scene, unexplained = fuser.add(objects, detections, view, odometry)
-        if len(scene) < config.min_objects:
-            scene = _nothing(scene)
+        scene = at_least(scene, config.min_objects)
         yield Stamped(SCENE_OBJECTS, bundle.log_time_ns, scene)
         yield Stamped(SCENE_MARKERS, bundle.log_time_ns, markers_from_scene(scene))
         left_out.update({_UNEXPLAINED: unexplained, _UNUSABLE: len(found) - len(objects)})
@@ -69,45 +66,6 @@ def process(
             f"no {DETECTIONS.topic} lie beside any of {scans} scans; run mcap-landmarks detect first, or read others "
             f"with --remap TOPIC={DETECTIONS.topic}"
         )
-
-
-def _usable(objects: ScanObjects) -> ScanObjects:
-    """The scan objects that are somewhere."""
-    places = zip(objects.positions_xy, objects.covariances, strict=True)
-    keep = [
-        i for i, (xy, spread) in enumerate(places) if len(xy) and np.isfinite(xy).all() and np.isfinite(spread).all()
-    ]
-    return ScanObjects(
-        objects.stamp_ns,
-        objects.frame_id,
-        tuple(objects.ids[i] for i in keep),
-        tuple(objects.hypotheses[i] for i in keep),
-        tuple(objects.positions_xy[i] for i in keep),
-        tuple(objects.covariances[i] for i in keep),
-        objects.extents_m[keep],
-    )
-
-
-def _wanted(detections: Detections, config: FuseConfig, left_out: Counter[str]) -> Detections:
-    """The detections that are boxes of what may be a landmark; the others are counted as left out."""
-    classes = [options[0][0] if options else "" for options in detections.hypotheses]
-    boxes = detections.boxes_xyxy
-    whole = np.flatnonzero(np.isfinite(boxes).all(axis=1) & (boxes[:, 2:] > boxes[:, :2]).all(axis=1)).tolist()
-    keep = []
-    for i, name in enumerate(classes):
-        if not (name and i in whole):
-            left_out[_NO_BOX] += 1
-        elif name in config.ignore_classes or name not in (config.landmark_classes or classes):
-            left_out[_UNWANTED.format(name)] += 1
-        else:
-            keep.append(i)
-    return Detections(
-        detections.stamp_ns,
-        detections.frame_id,
-        tuple(detections.ids[i] for i in keep),
-        tuple(detections.hypotheses[i] for i in keep),
-        boxes[keep].reshape(-1, 4),
-    )
 
 
 def _view(
@@ -131,10 +89,6 @@ def _camera(info: CameraInfo, config: FuseConfig) -> CameraModel:
     if config.rectified:
         return CameraModel.of("", size, info.projection[:, :3], np.zeros(0))
     return CameraModel.of(info.distortion_model, size, info.intrinsics, info.distortion)
-
-
-def _nothing(scene: SceneObjects) -> SceneObjects:
-    return SceneObjects(scene.stamp_ns, scene.frame_id, (), (), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0))
 
 
 STAGE = Stage(
