@@ -69,15 +69,18 @@ def parse_remaps(texts: Sequence[str]) -> dict[str, str]:
 
 def topics_for(role: Role, present: Collection[tuple[str, str]]) -> list[str]:
     """Topics that fit a role, of (topic, message type); scene objects on our own topic leave the others out."""
-    first = {message.ROS_TYPE for message in role.messages}
-    fitting = sorted({topic for topic, message_type in present if message_type in first})
-    if not fitting and role.usual:
-        fitting = sorted({topic for topic, kind in present if topic == role.usual and kind in role.types})
+    fitting = _of_types(present, [message.ROS_TYPE for message in role.messages])
+    if not fitting and role.usual in _of_types(present, role.types):
+        fitting = [role.usual]
     if role.name == "scene_objects":
         if channels.SCENE_OBJECTS.topic in fitting:
             return [channels.SCENE_OBJECTS.topic]
         return [topic for topic in fitting if topic not in channels.NO_SCENES]
     return [topic for topic in fitting if not topic.startswith(channels.RESULTS)]
+
+
+def _of_types(present: Collection[tuple[str, str]], types: Collection[str]) -> list[str]:
+    return sorted({topic for topic, ros_type in present if ros_type in types})
 
 
 def could_be(recording: Readable, channel: Channel[Message]) -> str:
@@ -107,20 +110,37 @@ def choose(recording: Readable, channel: Channel[Message], choice: Choice) -> tu
     if role is None:  # transforms that never change come on /tf as well, from ROS 1 and some drivers
         topics = {channel.topic, channels.TF.topic} if channel == channels.TF_STATIC else {channel.topic}
         return tuple(connection for topic, connection in named if topic in topics)
-    present = [(topic, connection.message_type) for topic, connection in named]
-    asked = choice.topics.get(role.name)
-    fitting = topics_for(role, present)
-    if asked is None and len(fitting) > 1 and channel == channels.CAMERA_INFO:
+    chosen = choice.topics.get(role.name)
+    if chosen is None:
+        fitting = topics_for(role, [(topic, connection.message_type) for topic, connection in named])
+        chosen = _only(recording, channel, fitting, choice)
+    if chosen is None:
+        return ()
+    found = tuple(connection for topic, connection in named if topic == chosen)
+    _check_chosen(recording, role, chosen, found)
+    return found
+
+
+def _only(recording: Readable, channel: Channel[Message], fitting: list[str], choice: Choice) -> str | None:
+    """The one topic that fits, None if none does.
+
+    Raises:
+        UsageError: several fit.
+    """
+    if channel == channels.CAMERA_INFO and len(fitting) > 1:
         fitting = _of_the_image(recording, fitting, choice)
-    if asked is None and len(fitting) > 1:
+    if len(fitting) > 1:
+        role = ROLES[channel]
         how = f"{role.option} TOPIC" if role.option != "--remap" else f"--remap TOPIC={channel.topic}"
         how += ", twice to merge two" if channel == channels.SCAN else ""
         raise UsageError(f"{recording.path}: {' and '.join(fitting)} could be the {role.name}; choose with {how}")
-    topic = asked or (fitting[0] if fitting else None)
-    found = tuple(connection for name, connection in named if name == topic)
-    if asked and not found:
+    return fitting[0] if fitting else None
+
+
+def _check_chosen(recording: Readable, role: Role, topic: str, found: Collection[Connection]) -> None:
+    if not found:
         raise UsageError(
-            f"{recording.path}: there is no topic {asked} for {role.option}; mcap-landmarks info lists them"
+            f"{recording.path}: there is no topic {topic} for {role.option}; mcap-landmarks info lists them"
         )
     for connection in found:
         if connection.message_type not in role.types:
@@ -128,7 +148,6 @@ def choose(recording: Readable, channel: Channel[Message], choice: Choice) -> tu
                 f"{recording.path}: {connection.topic} is {connection.message_type}, but {role.option} needs "
                 f"{' or '.join(role.types)}"
             )
-    return found
 
 
 def _of_the_image(recording: Readable, infos: list[str], choice: Choice) -> list[str]:

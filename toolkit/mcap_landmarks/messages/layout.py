@@ -138,14 +138,17 @@ def _flat(types: Definition, node: FieldType) -> _Flat | None:
     """Scalar type, width and kind of a number or of a message of numbers of one type."""
     sort, detail = node
     if sort == Nodetype.BASE:
-        scalar = _SCALARS.get(detail[0])
-        if scalar is None and detail[0] != "string":
-            raise KeyError(f"type {detail[0]}")
-        return (np.dtype(scalar), 1, Kind.NUMBER) if scalar else None
+        return None if detail[0] == "string" else (_scalar(detail[0]), 1, Kind.NUMBER)
     if sort != Nodetype.NAME or detail in _MOMENTS:
         return None
     names = {inner[1][0] if inner[0] == Nodetype.BASE else None for _, inner in types[detail]}
     if len(names) != 1 or not names <= set(_SCALARS):
         return None
     kind = Kind.QUATERNION if detail == "geometry_msgs/msg/Quaternion" else Kind.NUMBER
-    return np.dtype(_SCALARS[names.pop() or ""]), len(types[detail]), kind
+    return _scalar(names.pop() or ""), len(types[detail]), kind
+
+
+def _scalar(name: str) -> np.dtype[np.number]:
+    if name not in _SCALARS:
+        raise KeyError(f"type {name}")
+    return np.dtype(_SCALARS[name])

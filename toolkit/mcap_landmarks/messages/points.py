@@ -79,20 +79,26 @@ class PointCloud2:
         if not {"x", "y", "z"} <= fields.keys():
             raise MessageError(f"a point cloud with the fields {', '.join(fields) or 'none'} has no x, y and z")
         order = ">" if ros.is_bigendian else "<"
-        layout = {}
-        for name in "xyz":
-            kind = _PLACES.get(fields[name].datatype)
-            if kind is None:
-                raise MessageError(f"the {name} of a point cloud is of type {fields[name].datatype}, not a float")
-            layout[name] = order + kind
-        timed = [name for name, field in fields.items() if name in _TIME_NAMES and field.datatype in _TIMES]
-        layout.update({name: order + _TIMES[fields[name].datatype] for name in timed})
+        places = {name: order + _coordinate(fields[name]) for name in "xyz"}
+        times = {name: order + _TIMES[field.datatype] for name, field in fields.items() if _is_time(field)}
+        layout = {**places, **times}
         points = _points(ros, layout, [fields[name].offset for name in layout])
         xyz = np.stack([np.asarray(points[name], dtype=np.float32) for name in "xyz"], axis=1)
         stamp_ns = stamp_from_ros(ros.header.stamp)
         returned = np.array(np.isfinite(xyz).all(axis=1), dtype=np.bool_)
-        times_ns = _times_ns(points[timed[0]], returned, stamp_ns) if len(timed) == 1 else None
+        times_ns = _times_ns(points[next(iter(times))], returned, stamp_ns) if len(times) == 1 else None
         return cls(stamp_ns, ros.header.frame_id, xyz, times_ns)
+
+
+def _coordinate(field: RosObject) -> str:
+    """The format of a field that is a coordinate, without the order of its bytes."""
+    if field.datatype not in _PLACES:
+        raise MessageError(f"the {field.name} of a point cloud is of type {field.datatype}, not a float")
+    return _PLACES[field.datatype]
+
+
+def _is_time(field: RosObject) -> bool:
+    return field.name in _TIME_NAMES and field.datatype in _TIMES
 
 
 def _points(ros: RosObject, layout: dict[str, str], offsets: list[int]) -> NDArray[np.void]:
