@@ -39,11 +39,8 @@ COMPLEX_STILL = (
     "vision/families/yolov5.py output_shapes",
     "vision/metadata.py names_of",
 )
-FILE_NAMES_STILL = ("annotations", "batch", "centres", "index", "markers", "session")
-CLASS_NAMES_STILL = (
-    "Candidates", "Condition", "Converted", "Given", "Limits", "Log", "Settings", "Shape", "Solved", "Source",
-    "Trajectory", "View",
-)  # fmt: skip
+FILE_NAMES_STILL = ("annotations", "batch", "index", "markers", "match", "scene", "session")
+CLASS_NAMES_STILL = ("Candidates", "Layout", "LocalMap", "Session", "Solved", "Source", "Tracks", "Trajectory")
 
 
 @cache

@@ -14,7 +14,7 @@ from mcap_landmarks.messages.annotations import ImageAnnotations, Label, Outline
 from mcap_landmarks.messages.codec import M, Message
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CompressedImage
-from mcap_landmarks.messages.markers import Marker, MarkerArray, Shape
+from mcap_landmarks.messages.markers import Marker, MarkerArray, MarkerShape
 from mcap_landmarks.messages.match import LandmarkMatch, Status
 from mcap_landmarks.messages.numbers import UInt8
 from mcap_landmarks.messages.poses import Odometry, PoseStamped, PoseWithCovarianceStamped
@@ -72,7 +72,7 @@ def one_run(seed: int = 0) -> Run:
     entries = [entry for i, time_ns in enumerate(times) for entry in _bundle(rng, i, time_ns)]
     pose = PoseStamped.planar(times[0], "map", [1.0, 2, 3])
     path = PosePath(times[0], "map", tuple(dataclasses.replace(pose, stamp_ns=time_ns) for time_ns in times))
-    marker = Marker("landmarks", 0, Shape.CYLINDER, np.array([1.0, 2, 0]), np.ones(3), (1.0, 0.5, 0.25, 1.0))
+    marker = Marker("landmarks", 0, MarkerShape.CYLINDER, np.array([1.0, 2, 0]), np.ones(3), (1.0, 0.5, 0.25, 1.0))
     markers = (marker, dataclasses.replace(marker, number=1, text="bench", points_m=rng.normal(size=(3, 3))))
     entries += [
         (channels.MAP_PATH, times[0], path),

@@ -6,7 +6,7 @@ from hypothesis.extra.numpy import arrays
 from mcap_landmarks.messages.annotations import ImageAnnotations, Label, Outline
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
-from mcap_landmarks.messages.markers import Marker, MarkerArray, Shape
+from mcap_landmarks.messages.markers import Marker, MarkerArray, MarkerShape
 from mcap_landmarks.messages.match import Condition, LandmarkMatch, Status
 from mcap_landmarks.messages.numbers import UInt8
 from mcap_landmarks.messages.points import PointCloud2
@@ -71,7 +71,7 @@ def annotations(draw: st.DrawFn) -> ImageAnnotations:
 
 
 marker = st.builds(
-    Marker, text, st.integers(0, 9), st.sampled_from(Shape), vector(3), vector(3), color, text, vector(2, 3)
+    Marker, text, st.integers(0, 9), st.sampled_from(MarkerShape), vector(3), vector(3), color, text, vector(2, 3)
 )
 match = st.builds(
     LandmarkMatch,

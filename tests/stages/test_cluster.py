@@ -18,7 +18,7 @@ from mcap_landmarks.messages.poses import Odometry
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
-from mcap_landmarks.recording.association import Association, associate
+from mcap_landmarks.recording.time_association import Association, associate
 from mcap_landmarks.stage import Bundle, Omission
 from mcap_landmarks.stages.cluster import process
 

@@ -11,7 +11,7 @@ from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.messages.codec import encode
-from mcap_landmarks.messages.markers import MarkerArray, Shape
+from mcap_landmarks.messages.markers import MarkerArray, MarkerShape
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.typestore import typestore
 from mcap_landmarks.stage import Bundle, Stamped
@@ -245,7 +245,7 @@ def test_markers_are_a_cylinder_and_a_label_each() -> None:
     drawn = [e.message for e in results if isinstance(e, Stamped) and e.channel == SCENE_MARKERS]
     assert all(isinstance(message, MarkerArray) for message in drawn)
     first = drawn[0]
-    assert [marker.shape for marker in first.markers] == [Shape.CYLINDER, Shape.TEXT_VIEW_FACING] * 3
+    assert [marker.shape for marker in first.markers] == [MarkerShape.CYLINDER, MarkerShape.TEXT_VIEW_FACING] * 3
     assert [marker.text.rpartition(" ")[0].rpartition(" ")[0] for marker in first.markers[1::2]] == NAMES
     np.testing.assert_allclose(first.markers[0].position_m[:2], [5.0, 1.0])
     np.testing.assert_allclose(first.markers[0].size_m[:2], [0.3, 0.3])

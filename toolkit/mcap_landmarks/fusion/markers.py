@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mcap_landmarks.maps.markers import class_color
-from mcap_landmarks.messages.markers import Marker, MarkerArray, Shape
+from mcap_landmarks.maps.map_markers import class_color
+from mcap_landmarks.messages.markers import Marker, MarkerArray, MarkerShape
 from mcap_landmarks.messages.scene import SceneObjects
 
 _HEIGHT_M, _SMALLEST_M, _LETTERS_M = 0.5, 0.1, 0.25
@@ -20,7 +20,7 @@ def markers_from_scene(scene: SceneObjects) -> MarkerArray:
         size, letters = np.array([diameter, diameter, _HEIGHT_M]), np.array([0.0, 0.0, _LETTERS_M])
         text = f"{name} {100 * probability:.0f} %"
         markers += [
-            Marker("objects", i, Shape.CYLINDER, body, size, color),
-            Marker("names", i, Shape.TEXT_VIEW_FACING, label, letters, color, text),
+            Marker("objects", i, MarkerShape.CYLINDER, body, size, color),
+            Marker("names", i, MarkerShape.TEXT_VIEW_FACING, label, letters, color, text),
         ]
     return MarkerArray(scene.stamp_ns, scene.frame_id, tuple(markers), replaces=True)

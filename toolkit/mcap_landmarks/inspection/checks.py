@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mcap_landmarks.channels import RESULTS
 from mcap_landmarks.geometry.frames import REMEDY
 from mcap_landmarks.inspection.survey import Returns, Sensor, Survey, connected
-from mcap_landmarks.recording.association import BESIDE_NS, WINDOW_NS
+from mcap_landmarks.recording.time_association import BESIDE_NS, WINDOW_NS
 
 LEAST_HZ = {"image": 1.0, "scan": 2.0, "odometry": 5.0}
 """Rates below which much is lost between two messages, for a robot that walks."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mcap_landmarks.geometry.se2 import Array, rotation
 from mcap_landmarks.lidar.beams import Beams
 from mcap_landmarks.lidar.cells import Noise
-from mcap_landmarks.lidar.centres import centres
+from mcap_landmarks.lidar.centre_posteriors import centres
 from mcap_landmarks.lidar.segments import Cluster, extent_m, gap_m, hits_of, points_of
 from mcap_landmarks.lidar.shape_table import shape_table
 from mcap_landmarks.lidar.shapes import Shape

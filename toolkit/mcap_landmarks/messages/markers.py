@@ -19,7 +19,7 @@ from mcap_landmarks.messages.parts import (
 from mcap_landmarks.messages.typestore import RosObject
 
 
-class Shape(IntEnum):
+class MarkerShape(IntEnum):
     """The marker types in use."""
 
     CYLINDER = 3
@@ -33,7 +33,7 @@ class Marker:
 
     name: str
     number: int
-    shape: Shape
+    shape: MarkerShape
     position_m: Array
     size_m: Array
     color: Color
@@ -71,7 +71,7 @@ class MarkerArray:
 
 
 _ADD, _DELETE_ALL = 0, 3  # of visualization_msgs/Marker
-_ALL = Marker("", 0, Shape.CYLINDER, np.zeros(3), np.zeros(3), (0.0, 0.0, 0.0, 0.0))
+_ALL = Marker("", 0, MarkerShape.CYLINDER, np.zeros(3), np.zeros(3), (0.0, 0.0, 0.0, 0.0))
 
 
 def _to_ros(header: RosObject, marker: Marker, action: int = _ADD) -> RosObject:
@@ -105,7 +105,7 @@ def _from_ros(ros: RosObject) -> Marker:
     return Marker(
         ros.ns,
         ros.id,
-        Shape(ros.type),
+        MarkerShape(ros.type),
         point_from_ros(ros.pose.position),
         point_from_ros(ros.scale),
         (ros.color.r, ros.color.g, ros.color.b, ros.color.a),

@@ -9,7 +9,7 @@ import lz4.frame
 import zstandard
 
 from mcap_landmarks.recording.container import CHUNK, LARGEST_CHUNK, MESSAGE, MESSAGE_FIXED, RECORD, Opcode
-from mcap_landmarks.recording.index import Block
+from mcap_landmarks.recording.summary_index import Block
 from mcap_landmarks.stage import Connection, RawMessage
 
 

@@ -16,8 +16,8 @@ from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, carried_fingerprint
 from mcap_landmarks.recording.blocks import DamagedBlockError, block_messages
 from mcap_landmarks.recording.container import CHUNK, MAGIC, RECORD, Opcode, parse
-from mcap_landmarks.recording.index import Block, Index, index_from_summary, read_record
 from mcap_landmarks.recording.rebuild_index import index_by_scanning
+from mcap_landmarks.recording.summary_index import Block, Index, index_from_summary, read_record
 from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
 
 

@@ -8,7 +8,7 @@ from mcap.exceptions import McapError
 
 from mcap_landmarks.recording.blocks import DamagedBlockError, chunk_content, cut_chunk_content, records_in
 from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, parse
-from mcap_landmarks.recording.index import Block, Index
+from mcap_landmarks.recording.summary_index import Block, Index
 
 RUN_BYTES = 1 << 20
 """A run of messages outside chunks ends here, as our chunks do: each becomes one block, which is read whole."""

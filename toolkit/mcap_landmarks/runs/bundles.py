@@ -11,8 +11,8 @@ from mcap_landmarks.maps.scene_objects import usable
 from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage
-from mcap_landmarks.recording.association import Association, associate
 from mcap_landmarks.recording.odometry_buffer import odometry_from
+from mcap_landmarks.recording.time_association import Association, associate
 from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage, Readable
 
 HELD = (CAMERA_INFO, TF_STATIC)

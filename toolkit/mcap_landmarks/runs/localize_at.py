@@ -11,7 +11,7 @@ from mcap_landmarks.channels import MATCH, POSE, POSE_COVARIANCE
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.match import LandmarkMatch
-from mcap_landmarks.recording.association import WINDOW_NS
+from mcap_landmarks.recording.time_association import WINDOW_NS
 from mcap_landmarks.runs.bundles import Reading
 from mcap_landmarks.runs.needed_stages import missing_stages
 from mcap_landmarks.runs.plan import Request, Step, plan

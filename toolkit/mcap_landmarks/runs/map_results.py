@@ -10,7 +10,7 @@ from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, Manifest, Outcome, stage_records
 from mcap_landmarks.mapping.observations import Trajectory
 from mcap_landmarks.maps.database import read_manifest, read_map
-from mcap_landmarks.maps.markers import markers_from_map
+from mcap_landmarks.maps.map_markers import markers_from_map
 from mcap_landmarks.maps.model import LandmarkMap, Source
 from mcap_landmarks.messages.poses import Path as PathMessage
 from mcap_landmarks.messages.poses import PoseStamped

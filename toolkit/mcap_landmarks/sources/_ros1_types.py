@@ -30,7 +30,7 @@ _NUMPY = {"bool": "bool_", "char": "uint8", "byte": "uint8"}
 
 
 @dataclass(frozen=True, slots=True)
-class Converted:
+class ConvertedType:
     """A ROS 1 type in ROS 2: its name, the text of its definition, and how its messages are converted.
 
     `convert` raises MessageError for bytes that do not fit the bag's definition.
@@ -42,7 +42,7 @@ class Converted:
 
 
 @cache
-def converted(ros_type: str, text: str) -> Converted:
+def converted(ros_type: str, text: str) -> ConvertedType:
     """How a type of a bag is carried in ROS 2, from its ROS 1 name (`nav_msgs/Odometry`) and definition.
 
     A humble type takes over if it has every field of the bag's; fields that are new in humble get zeros.
@@ -62,13 +62,15 @@ def converted(ros_type: str, text: str) -> Converted:
     own = target_name not in humble or target.fielddefs[target_name][1] != humble[target_name][1]
     schema = target.generate_msgdef(target_name, ros_version=2)[0] if own else definition(target_name)
     if _same_bytes(source.fielddefs, source_name, target.fielddefs, target_name):
-        return Converted(target_name, schema, _guarded(lambda data: target.ros1_to_cdr(data, target_name), ros_type))
+        return ConvertedType(
+            target_name, schema, _guarded(lambda data: target.ros1_to_cdr(data, target_name), ros_type)
+        )
     migrate = _migration(source.fielddefs, source_name, target, target_name)
 
     def rewrite(data: Payload) -> Payload:
         return target.serialize_cdr(migrate(source.deserialize_ros1(data, source_name)), target_name)
 
-    return Converted(target_name, schema, _guarded(rewrite, ros_type))
+    return ConvertedType(target_name, schema, _guarded(rewrite, ros_type))
 
 
 def _guarded(convert: Convert, ros_type: str) -> Convert:

@@ -8,8 +8,8 @@ from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.poses import Odometry, PoseStamped
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
-from mcap_landmarks.recording.association import WINDOW_NS, Association, associate
 from mcap_landmarks.recording.odometry_buffer import odometry_from
+from mcap_landmarks.recording.time_association import WINDOW_NS, Association, associate
 from mcap_landmarks.stage import Bundle
 
 SECOND = 10**9

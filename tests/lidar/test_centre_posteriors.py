@@ -8,7 +8,7 @@ from mcap_landmarks.geometry.se2 import Array, rotation
 from mcap_landmarks.lidar import shapes
 from mcap_landmarks.lidar.beams import sweep
 from mcap_landmarks.lidar.cells import Noise
-from mcap_landmarks.lidar.centres import CentrePosteriors, centres
+from mcap_landmarks.lidar.centre_posteriors import CentrePosteriors, centres
 from mcap_landmarks.lidar.segments import Breaks, points_of, segments
 from mcap_landmarks.lidar.shapes import Shape, profile
 from mcap_landmarks.lidar.windows import windows

@@ -7,7 +7,7 @@ import numpy as np
 
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.messages.annotations import Color
-from mcap_landmarks.messages.markers import Marker, MarkerArray, Shape
+from mcap_landmarks.messages.markers import Marker, MarkerArray, MarkerShape
 
 _HEIGHT_M, _SMALLEST_M, _LETTERS_M = 0.6, 0.1, 0.35
 
@@ -28,7 +28,7 @@ def markers_from_map(landmark_map: LandmarkMap, stamp_ns: int) -> MarkerArray:
         body = np.array([x, y, _HEIGHT_M / 2])
         label = np.array([x, y, _HEIGHT_M + _LETTERS_M])
         markers += [
-            Marker("landmarks", int(i), Shape.CYLINDER, body, np.array([diameter, diameter, _HEIGHT_M]), color),
-            Marker("names", int(i), Shape.TEXT_VIEW_FACING, label, np.array([0.0, 0.0, _LETTERS_M]), color, name),
+            Marker("landmarks", int(i), MarkerShape.CYLINDER, body, np.array([diameter, diameter, _HEIGHT_M]), color),
+            Marker("names", int(i), MarkerShape.TEXT_VIEW_FACING, label, np.array([0.0, 0.0, _LETTERS_M]), color, name),
         ]
     return MarkerArray(stamp_ns, landmark_map.frame, tuple(markers))
