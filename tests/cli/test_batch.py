@@ -24,6 +24,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return here
 
 
+@pytest.mark.slow
 def test_one_that_fails_does_not_stop_the_others(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -48,6 +49,7 @@ def test_one_that_fails_does_not_stop_the_others(
     jsonschema.validate(json.loads((tmp_path / "figures" / "a.json").read_text()), schema_of("evaluate"))
 
 
+@pytest.mark.slow
 def test_all_failed(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call("batch", "map", folder / "logs" / "none.mcap", "-o", tmp_path / "maps") == 1
     assert "1 failed" in capsys.readouterr().out

@@ -60,6 +60,7 @@ def sensed(stamp_ns: int):  # type: ignore[no-untyped-def] # noqa: ANN201 - entr
     ]
 
 
+@pytest.mark.slow
 def test_words_document_and_picture(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = write(tmp_path / "r.mcap", [*sensed(START_NS), *localized_messages()])
     assert call("explain", log, "--at", START_NS, "-o", tmp_path / "e.png") == 0
@@ -135,6 +136,7 @@ def agrees(log: Path, capsys: pytest.CaptureFixture[str], every: int = 1) -> set
     return statuses
 
 
+@pytest.mark.slow
 def test_the_explanation_is_what_localize_decided(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert agrees(GOLDEN, capsys, every=8) == {"localized"}
     world = unique_classes()
@@ -144,6 +146,7 @@ def test_the_explanation_is_what_localize_decided(tmp_path: Path, capsys: pytest
     assert agrees(log, capsys) == {"localized", "too_few_objects", "inconsistent", "weak_geometry"}
 
 
+@pytest.mark.slow
 def test_a_log_from_before_conditions_were_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of one with the definition that LandmarkMatch had then, all is told but for what it does not hold."""
     matches = read(BEFORE_CONDITIONS, MATCH)

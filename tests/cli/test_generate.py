@@ -57,6 +57,7 @@ def test_text_output_names_the_file(scene: Path, capsys: pytest.CaptureFixture[s
     assert "log.mcap: 0.7" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_info_finds_every_role(scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     target = scene.with_name("log.mcap")
     run(scene, "-o", target, "--workers", "1")
@@ -97,6 +98,7 @@ def test_a_bad_scenario_is_refused_in_one_line(scene: Path, capsys: pytest.Captu
     assert not scene.with_name("log.mcap").exists()
 
 
+@pytest.mark.slow
 def test_without_pybullet_it_says_what_to_install(
     scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -107,6 +109,7 @@ def test_without_pybullet_it_says_what_to_install(
     assert "pip install 'mcap-landmarks[generator]'" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_stdout_is_only_json(scene: Path) -> None:
     """PyBullet prints from C, past Python's streams."""
     command = [sys.executable, "-c", "from mcap_landmarks.cli.main import run; run()", "generate", str(scene)]

@@ -39,6 +39,7 @@ def asked(folder: Path, capsys: pytest.CaptureFixture[str], when: object) -> dic
     return document
 
 
+@pytest.mark.slow
 def test_the_answer_is_that_of_the_whole_run(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with open_recording(folder / "out.mcap") as recording:
         poses = {
@@ -72,6 +73,7 @@ def test_it_says_so_in_words(folder: Path, capsys: pytest.CaptureFixture[str]) -
     assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.slow
 def test_bundles_before_are_joined(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     surveyed = read_map(folder / "map.db")
     classes = tuple(f"kind {i % 3}" for i in range(len(surveyed)))

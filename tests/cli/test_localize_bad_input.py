@@ -73,6 +73,7 @@ def test_maps_without_geometry(
     assert not out.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("repeated", [False, True])
 @pytest.mark.parametrize(("map_scale", "log_scale"), [(1000.0, 1.0), (1.0, 1000.0)])
 def test_units_off_by_a_thousand(
@@ -88,6 +89,7 @@ def test_units_off_by_a_thousand(
     assert "not in metres, so convert it" in line
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("repeated", [False, True])
 def test_duplicates_are_left_out_and_counted(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], repeated: bool
@@ -119,6 +121,7 @@ def test_duplicates_are_left_out_and_counted(
     assert abs(plain - twice) <= 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("repeated", [False, True])
 def test_covariances_zero_or_impossible(tmp_path: Path, capsys: pytest.CaptureFixture[str], repeated: bool) -> None:
     def spoilt(i: int, scene: SceneObjects) -> SceneObjects:
@@ -136,6 +139,7 @@ def test_covariances_zero_or_impossible(tmp_path: Path, capsys: pytest.CaptureFi
     assert found[POSE.topic] > 20
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("repeated", [False, True])
 def test_covariances_of_next_to_nothing(tmp_path: Path, repeated: bool) -> None:
     def tiny(_: int, scene: SceneObjects) -> SceneObjects:

@@ -48,6 +48,7 @@ def test_localize_finds_every_bundle(folder: Path, capsys: pytest.CaptureFixture
     assert document["map"]["rmse_aligned_m"] < 0.03
 
 
+@pytest.mark.slow
 def test_json_documents(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call("map", folder / "a.mcap", "--map", tmp_path / "a.db", "--json") == 0
     document = json.loads(capsys.readouterr().out)
@@ -60,6 +61,7 @@ def test_json_documents(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     assert document["stages"] == {"localize": "ran"}
 
 
+@pytest.mark.slow
 def test_twice_the_same_bytes(folder: Path, tmp_path: Path) -> None:
     assert call("map", folder / "a.mcap", "--map", tmp_path / "again.db") == 0
     assert (tmp_path / "again.db").read_bytes() == (folder / "a.db").read_bytes()
@@ -80,6 +82,7 @@ def test_results_only(folder: Path, tmp_path: Path) -> None:
     assert found[MATCH.topic] == 120
 
 
+@pytest.mark.slow
 def test_many_logs_go_into_a_folder(folder: Path, tmp_path: Path) -> None:
     logs = (folder / "a.mcap", folder / "b.mcap")
     assert call("localize", *logs, "--map", folder / "a.db", "-o", tmp_path / "out") == 0
@@ -91,6 +94,7 @@ def test_a_map_from_the_reference(folder: Path, tmp_path: Path) -> None:
     assert call("localize", folder / "b.mcap", "--map", tmp_path / "truth.db", "-o", tmp_path / "b.mcap") == 0
 
 
+@pytest.mark.slow
 def test_a_frame_above_odom_is_left_alone(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     transform = Transform.planar(1, ("world", "odom"), (0, 0, 0))
     log = write(tmp_path / "log.mcap", [Stamped(TF, 1, TFMessage((transform,))), *messages(seed=2)])
@@ -147,6 +151,7 @@ def test_a_map_of_another_version(folder: Path, tmp_path: Path, capsys: pytest.C
     assert not (tmp_path / "out.mcap").exists()
 
 
+@pytest.mark.slow
 def test_missing_and_ambiguous_inputs(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     blind = write(tmp_path / "blind.mcap", without(ODOMETRY, messages()))
     line = refused(capsys, 1, "map", blind, "--map", tmp_path / "x.db")

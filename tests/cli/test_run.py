@@ -80,6 +80,7 @@ def test_localize_makes_the_scene_objects_that_a_log_lacks(here: Path, capsys: p
     assert set(document(capsys, here, *words)["stages"].values()) == {"reused"}
 
 
+@pytest.mark.slow
 def test_a_map_from_pixels(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     looks = counted(monkeypatch)
     words = ("map", here / "log.mcap", "--map", here / "new.db")
@@ -159,6 +160,7 @@ def test_an_interruption_leaves_finished_stages(
     assert not (here / ".out.mcap.parts").exists()
 
 
+@pytest.mark.slow
 def test_several_logs(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     raw_log(here / "other.mcap", COUNT - 2)
     logs = (here / "log.mcap", here / "other.mcap")

@@ -49,6 +49,7 @@ def clouds(tmp_path: Path) -> tuple[Path, Path]:
     return write(tmp_path / "log.mcap", changed(SCAN, as_cloud)), two_posts(tmp_path / "model.onnx")
 
 
+@pytest.mark.slow
 def test_a_slice_of_clouds_is_mapped_and_localized(
     clouds: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -91,6 +92,7 @@ def test_a_map_needs_odometry_which_is_said_at_once(
     assert call(*words, "--odom", POSES.topic) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("frame", "is_written"), [("world", True), ("map", False), ("/map", False), ("", False)])
 def test_no_frame_is_its_own_parent(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], frame: str, is_written: bool

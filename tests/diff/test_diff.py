@@ -75,6 +75,7 @@ def test_a_planted_change_is_found_and_nothing_else(name: str, tmp_path: Path) -
     assert {case["time_ns"] for case in worst} == {time_ns}
 
 
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(st.lists(st.sampled_from(sorted(CHANGES)), min_size=1, max_size=4, unique=True))
 def test_swapped_sides_mirror_each_other(tmp_path_factory: pytest.TempPathFactory, names: list[str]) -> None:
@@ -166,6 +167,7 @@ def test_equal_files_are_not_read(tmp_path: Path) -> None:
     assert found.document["channels"]["/landmarks/detections"]["same"] == BUNDLES
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(st.lists(st.sampled_from(sorted(CHANGES)), min_size=1, max_size=6, unique=True), st.integers(1, 4000))
 def test_reading_in_parts_changes_nothing(

@@ -3,12 +3,14 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from mcap_landmarks.estimation.calibration import calibrate
 from mcap_landmarks.estimation.pose import solve_poses
 
 from tests.benchmark.snapshots import COVARIANCE, read_snapshots
 
 
+@pytest.mark.slow
 def test_a_real_cameras_ranges_are_depths_and_positions_good(shared_data: Path) -> None:
     given = read_snapshots(shared_data / "mrclam" / "mrclam1.mat")
     model = calibrate(given.landmarks_xy, given.range_m, given.bearing_rad, COVARIANCE, mask=given.mask)

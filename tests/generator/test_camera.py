@@ -186,6 +186,7 @@ def test_jpeg_is_read_back(scene: tuple[Staged, Renderer]) -> None:
     assert np.abs(read.astype(int) - image.astype(int)).mean() < 4
 
 
+@pytest.mark.slow
 def test_objects_that_walk_are_seen_where_they_are(stage_text: StageText) -> None:
     staged = stage_text(
         'objects = [ { class = "person", variant = "legs", at = [6.0, 2.0], walk = [[6.0, -2.0]], speed_mps = 1.0 } ]\n'

@@ -56,6 +56,7 @@ def true_move(history: History) -> Floats:
     return np.array([c * away[0] + s * away[1], -s * away[0] + c * away[1], float(wrap(end[2] - START[2]))])
 
 
+@pytest.mark.slow
 def test_without_errors_the_wheels_tell_the_way(driven: History) -> None:
     odometry = reckoned(driven, OdometrySpec(distance_slip=0.0, heading_slip_deg=0.0))
     error = odometry.pose - true_move(driven)
@@ -64,6 +65,7 @@ def test_without_errors_the_wheels_tell_the_way(driven: History) -> None:
     assert odometry.covariance == pytest.approx(np.zeros((3, 3)))
 
 
+@pytest.mark.slow
 def test_drift_over_20_seeds_is_the_configured_one() -> None:
     """Within 35 %: after 25 m straight on, the spread of distance and heading, and the covariance's own claim."""
     spec = OdometrySpec(distance_slip=0.02, heading_slip_deg=0.5)
@@ -86,6 +88,7 @@ def test_drift_over_20_seeds_is_the_configured_one() -> None:
     assert np.rad2deg(claimed[2]) == pytest.approx(0.5 * 5, rel=0.01)
 
 
+@pytest.mark.slow
 def test_systematic_errors_scale_distance_and_turn(driven: History) -> None:
     exact = OdometrySpec(distance_slip=0.0, heading_slip_deg=0.0)
     too_large = OdometrySpec(distance_slip=0.0, heading_slip_deg=0.0, radius_error=0.02)

@@ -1,6 +1,7 @@
 """The README's pictures show what they say."""
 
 import numpy as np
+import pytest
 from mcap_landmarks_generator.pictures import birds_eye, first_good_image, lidar_field, top_view
 
 from tests.generator.conftest import StageText
@@ -37,6 +38,7 @@ def test_beams_end_on_the_objects(stage_text: StageText) -> None:
     assert abs(near_hydrant[:, 1].max() - (150 - 0.15 * 25)) < 6
 
 
+@pytest.mark.slow
 def test_views_from_a_height_and_from_the_robot_are_pictures(stage_text: StageText) -> None:
     staged = stage_text(SCENE)
     assert birds_eye(staged, (160, 80)).shape == (80, 160, 3)

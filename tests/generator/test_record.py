@@ -50,6 +50,7 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> tuple[Staged, Path]:
     return staged, folder
 
 
+@pytest.mark.slow
 def test_one_worker_or_two_give_the_same_bytes(short: tuple[Staged, Path]) -> None:
     staged, folder = short
     record(staged, folder / "two.mcap", workers=2)
@@ -61,6 +62,7 @@ def develop(darkroom: Darkroom, job: ImageJob) -> Messages:
     return darkroom.pick_up()
 
 
+@pytest.mark.slow
 def test_a_killed_worker_is_an_error(short: tuple[Staged, Path]) -> None:
     staged, _ = short
     jobs = [event for event in Simulation(staged).run() if isinstance(event, ImageJob)]
@@ -73,6 +75,7 @@ def test_a_killed_worker_is_an_error(short: tuple[Staged, Path]) -> None:
             develop(darkroom, jobs[1])
 
 
+@pytest.mark.slow
 def test_another_seed_gives_other_noise_in_the_same_world(short: tuple[Staged, Path]) -> None:
     _, folder = short
     other = stage(load_scenario(str(folder / "short.toml"), ["camera.when=never"], seed=4))
@@ -104,6 +107,7 @@ def test_messages_come_in_order_and_complete(short: tuple[Staged, Path]) -> None
     assert '"class": "suitcase"' in run["config"]
 
 
+@pytest.mark.slow
 def test_others_read_every_message(short: tuple[Staged, Path]) -> None:
     path = short[1] / "one.mcap"
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
@@ -131,6 +135,7 @@ def test_the_truth_says_where_robot_and_objects_are(short: tuple[Staged, Path]) 
     assert objects.radii_m[0] == pytest.approx(0.15)
 
 
+@pytest.mark.slow
 def test_a_collision_is_reported(stage_text: StageText, tmp_path: Path) -> None:
     staged = stage_text(
         """\
@@ -146,6 +151,7 @@ waypoints = [ { at = [0.0, 0.0] }, { at = [0.5, 0.0], stop_s = 2.0 } ]
     assert 1.0 < summary.collisions[0][0] < 3.0
 
 
+@pytest.mark.slow
 def test_a_stuck_robot_is_an_error_and_leaves_no_file(stage_text: StageText, tmp_path: Path) -> None:
     staged = stage_text(
         """\
@@ -166,6 +172,7 @@ def test_a_way_is_needed(stage_text: StageText, tmp_path: Path) -> None:
         record(stage_text("seed = 1\n"), tmp_path / "none.mcap")
 
 
+@pytest.mark.slow
 def test_images_only_at_stops(stage_text: StageText) -> None:
     staged = stage_text(SHORT.replace("[camera]", '[camera]\nwhen = "stops"'))
     jobs = [event for event in Simulation(staged).run() if isinstance(event, ImageJob)]
@@ -173,6 +180,7 @@ def test_images_only_at_stops(stage_text: StageText) -> None:
     assert [job.index for job in jobs] == list(range(len(jobs)))
 
 
+@pytest.mark.slow
 def test_laps_come_back(stage_text: StageText) -> None:
     text = "[camera]\nwhen = 'never'\n[robot]\nspeed_factor = 4.0\n[trajectory]\nlaps = 2\nwaypoints = ["
     staged = stage_text(text + "{ at = [0.0, 0.0] }, { at = [1.0, 0.0] }, { at = [1.0, 1.0] } ]\n")

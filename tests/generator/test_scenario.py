@@ -120,6 +120,7 @@ def test_an_unknown_name_gets_a_hint() -> None:
         load_scenario("smal")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(bundled()))
 def test_bundled_scenarios_can_be_run(name: str) -> None:
     staged = stage(load_scenario(name))

@@ -38,6 +38,7 @@ def make_localize(folder: Path) -> None:
     assert run("localize", log, *where, *span(10)) == DONE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("make", "names"),
     [(make_map, ("map.db", "map.mcap")), (make_localize, ("localize.mcap",))],

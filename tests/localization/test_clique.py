@@ -118,7 +118,7 @@ def best_place(matcher: Matcher, seen: SceneObjects) -> list[Pair]:
     return max(matched, key=len, default=[])
 
 
-@pytest.mark.parametrize("count", [5, 7, 8, 9, 12, 16, 24])
+@pytest.mark.parametrize("count", [5, 7, *(pytest.param(many, marks=pytest.mark.slow) for many in (8, 9, 12, 16, 24))])
 def test_as_many_inliers_as_the_maximum_clique(count: int) -> None:
     rng = np.random.default_rng(count)
     for _ in range(4):
@@ -132,6 +132,7 @@ def test_as_many_inliers_as_the_maximum_clique(count: int) -> None:
             assert len(clique) < 5 or len(set(clique) - set(matched)) <= 1
 
 
+@pytest.mark.slow
 def test_cliques_without_near_objects_are_found() -> None:
     rng = np.random.default_rng(3)
     for _ in range(12):

@@ -77,6 +77,7 @@ def stretch(world: World, seed: int, scale: float = 1.0) -> tuple[list[Match], l
     return found, truth
 
 
+@pytest.mark.slow
 def test_a_sequence_finds_the_place_among_many() -> None:
     world = random_world(np.random.default_rng(5), 400)
     found_at_the_end = 0

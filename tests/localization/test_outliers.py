@@ -1,6 +1,7 @@
 """Wrong classes and objects that are none: what is learned of them, and places found all the same."""
 
 import numpy as np
+import pytest
 from mcap_landmarks.localization.acceptance import PairDensity
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.index import MapIndex
@@ -67,6 +68,7 @@ def test_places_are_found_among_wrong_classes_and_strays() -> None:
     assert found >= 11
 
 
+@pytest.mark.slow
 def test_a_narrow_camera_finds_them_on_the_way() -> None:
     found, wrong = first_answers(random_world(np.random.default_rng(6), 100), Conditions(CAMERA, 0.2, 2), 6)
     assert wrong == 0

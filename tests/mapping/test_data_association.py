@@ -34,6 +34,7 @@ def once_around(rng: np.random.Generator) -> tuple[Array, Array, Array]:
     return poses, odometry, covariances
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 2])
 def test_after_a_long_loop_what_was_seen_first_is_recognised(seed: int) -> None:
     rng = np.random.default_rng(seed)

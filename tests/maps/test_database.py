@@ -34,6 +34,7 @@ def maps(draw: st.DrawFn) -> LandmarkMap:
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(maps())
 def test_map_survives_the_database(tmp_path_factory: pytest.TempPathFactory, landmark_map: LandmarkMap) -> None:

@@ -76,6 +76,7 @@ def check(table: Table, objects: list[Any]) -> None:
         check(child, [element for found in lists for element in found])
 
 
+@pytest.mark.slow
 @settings(max_examples=150)
 @given(st.lists(MESSAGES, min_size=1, max_size=4))
 def test_columns_are_what_rosbags_decodes(messages: list[Message]) -> None:

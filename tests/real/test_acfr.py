@@ -26,6 +26,8 @@ from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.stage import Channel, Stamped
 from scipy.spatial.transform import Rotation
 
+pytestmark = pytest.mark.slow
+
 SHOTS = (1, 5, 10, 15, 20, 25, 30, 35)
 SIZE_PX = (1920, 1208)
 STEP_NS = 20 * 10**9

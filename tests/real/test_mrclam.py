@@ -7,6 +7,8 @@ from typing import Any
 import pytest
 from mcap_landmarks.cli.main import run
 
+pytestmark = pytest.mark.slow
+
 
 def call(*words: object) -> None:
     with pytest.raises(SystemExit) as stop:

@@ -20,6 +20,8 @@ from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.stage import Stamped
 from scipy.io import loadmat
 
+pytestmark = pytest.mark.slow
+
 STEP_NS, STRIDE = 10**8, 8
 POLAR = np.diag([0.12**2, 0.03**2])
 

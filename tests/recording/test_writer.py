@@ -52,6 +52,7 @@ def test_other_tools_read_it(tmp_path: Path) -> None:
         assert chunk.message_end_time - chunk.message_start_time <= 5 * SECOND
 
 
+@pytest.mark.slow
 def test_doctor_finds_nothing(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     write_log(path)

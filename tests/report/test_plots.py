@@ -118,6 +118,7 @@ def test_lines_break_where_time_does() -> None:
     assert not len(breaks(Trajectory.of(times * 10, poses)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", list(FORMATS))
 def test_same_input_same_bytes(form: str, database: Path, log: Path) -> None:
     pictures = []

@@ -40,6 +40,7 @@ BAGS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in BAGS if not name.endswith(".bag")])
 def test_ros2_bags_arrive_whole(name: str, tmp_path: Path, shared_data: Path) -> None:
     source, target = shared_data / "bags" / name, tmp_path / "out.mcap"
@@ -51,6 +52,7 @@ def test_ros2_bags_arrive_whole(name: str, tmp_path: Path, shared_data: Path) ->
     assert doctor(target) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in BAGS if name.endswith(".bag")])
 def test_ros1_bags_arrive_whole(name: str, tmp_path: Path, shared_data: Path) -> None:
     """Counts, and field by field the values of every message, against rosbags' reading of the bag."""

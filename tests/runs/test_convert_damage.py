@@ -72,6 +72,7 @@ def test_the_input_is_never_the_output(tmp_path: Path) -> None:
         run([source, source], tmp_path / "out.mcap")
 
 
+@pytest.mark.slow
 def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     source = write_ros1(tmp_path / "a.bag", count=2000)
     program = "from mcap_landmarks.cli.main import run; run()"

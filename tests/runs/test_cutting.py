@@ -82,6 +82,7 @@ def results(path: Path) -> list[tuple[str, int, bytes]]:
     return sorted(entry for entry in found if entry[0].startswith("/landmarks/"))
 
 
+@pytest.mark.slow
 def test_the_latest_of_every_frame_and_camera_come_along(here: Path) -> None:
     run = cut(here, "log.mcap", "out.mcap")
     before = of_topic(here / "out.mcap", TF_STATIC.topic)
@@ -103,6 +104,7 @@ def test_the_latest_of_every_frame_and_camera_come_along(here: Path) -> None:
     assert told == {"/camera/camera_info": 1, "/ground_truth/objects": 1, "/tf_static": 3}
 
 
+@pytest.mark.slow
 def test_a_cut_log_gives_by_itself_what_it_gave_within_the_whole(here: Path) -> None:
     cut(here, "log.mcap", "out.mcap")
     run = cut(here, "out.mcap", "again.mcap", None, force=True)
@@ -114,6 +116,7 @@ def test_a_cut_log_gives_by_itself_what_it_gave_within_the_whole(here: Path) -> 
     assert run.notes == reused.notes == ()
 
 
+@pytest.mark.slow
 def test_the_same_cut_is_reused_and_told_again(here: Path) -> None:
     first = cut(here, "log.mcap", "out.mcap")
     data = (here / "out.mcap").read_bytes()
@@ -124,6 +127,7 @@ def test_the_same_cut_is_reused_and_told_again(here: Path) -> None:
     assert (here / "out.mcap").read_bytes() == (here / "other.mcap").read_bytes() == data
 
 
+@pytest.mark.slow
 def test_without_static_transforms_the_others_hold(here: Path) -> None:
     moved = [dataclasses.replace(one, channel=TF) if one.channel == TF_STATIC else one for one in messages()]
     write_log(here / "log.mcap", moved)
@@ -161,6 +165,7 @@ def test_what_lasts(topic: str, kind: str, durability: str, lasts: bool) -> None
     assert latched([connection]) == [connection] * lasts
 
 
+@pytest.mark.slow
 def test_whole_logs_and_results_alone_carry_nothing(here: Path) -> None:
     assert cut(here, "log.mcap", "a.mcap", None).notes == ()
     assert cut(here, "log.mcap", "b.mcap", 1).notes == ()

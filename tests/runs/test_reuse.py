@@ -96,6 +96,7 @@ def test_results_are_found_in_the_log_itself(here: Path, monkeypatch: pytest.Mon
     assert len(looks) == COUNT
 
 
+@pytest.mark.slow
 def test_it_does_not_matter_where_results_came_from(here: Path) -> None:
     run_stages(asked(here), here / "whole.mcap", ALL, "run")
     run_stages(asked(here), here / "a.mcap", ["detect"], "run")
@@ -104,6 +105,7 @@ def test_it_does_not_matter_where_results_came_from(here: Path) -> None:
     assert (here / "c.mcap").read_bytes() == (here / "whole.mcap").read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "ran", "reason"),
     [
@@ -120,6 +122,7 @@ def test_what_decides_a_key(here: Path, changes: dict[str, Any], ran: set[str], 
     assert reason in reasons(run)[min(ran)]
 
 
+@pytest.mark.slow
 def test_another_model_or_program_runs_anew(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run_stages(asked(here), here / "out.mcap", FRONT, "run")
     (here / "model.onnx").write_bytes((here / "model.onnx").read_bytes() + b"")
@@ -259,6 +262,7 @@ def test_where_nothing_may_be_written_the_error_says_so(here: Path) -> None:
     assert (here / ".out.mcap.parts").read_text() == "in the way"
 
 
+@pytest.mark.slow
 def test_our_transforms_stand_beside_the_logs_own(here: Path) -> None:
     other = Stamped(TF, 1, TFMessage((Transform.planar(1, ("base_footprint", "wheel"), (0, 0, 0)),)))
     with create_recording(here / "log.mcap") as writer:

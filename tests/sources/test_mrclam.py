@@ -211,6 +211,7 @@ def test_damaged_surveys_and_zips_are_refused(tmp_path: Path) -> None:
         open_all(tmp_path / "set.zip")
 
 
+@pytest.mark.slow
 def test_dataset_6_has_every_row(shared_data: Path) -> None:
     logs = open_all(shared_data / "mrclam" / "MRCLAM_Dataset6.zip")
     counts = [{entry.connection.topic: entry.count for entry in log.parts[0].channels} for log in logs]

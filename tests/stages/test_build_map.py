@@ -62,6 +62,7 @@ def test_a_loop_with_repeated_classes_closes() -> None:
     assert all(len(group.landmark_ids) == 3 for group in landmark_map.groups)
 
 
+@pytest.mark.slow
 def test_two_logs_make_one_map() -> None:
     classes, positions = ring()
     logs = [
@@ -74,6 +75,7 @@ def test_two_logs_make_one_map() -> None:
     assert [source.bundles for source in landmark_map.sources] == [240, 240]
 
 
+@pytest.mark.slow
 def test_a_prior_keeps_its_frame_and_ids() -> None:
     classes, positions = ring()
     first, _ = solve([observe(drive(circle(0.6), classes, positions, seed=4), CONFIG)], None, CONFIG)
@@ -85,6 +87,7 @@ def test_a_prior_keeps_its_frame_and_ids() -> None:
     assert second.sightings[: len(first)].sum() > first.sightings.sum()
 
 
+@pytest.mark.slow
 def test_the_same_log_gives_the_same_map() -> None:
     classes, positions = ring()
     maps = [solve([observe(drive(circle(), classes, positions, seed=6), CONFIG)], None, CONFIG)[0] for _ in range(2)]
@@ -92,6 +95,7 @@ def test_the_same_log_gives_the_same_map() -> None:
     assert maps[0].ids == maps[1].ids
 
 
+@pytest.mark.slow
 def test_a_misread_class_is_tentative() -> None:
     classes, positions = ring()
     rng = np.random.default_rng(8)
@@ -110,6 +114,7 @@ def test_a_misread_class_is_tentative() -> None:
     assert sorted(confirmed) == sorted(classes)
 
 
+@pytest.mark.slow
 def test_logs_of_different_places_do_not_join() -> None:
     classes, positions = ring()
     rng = np.random.default_rng(10)

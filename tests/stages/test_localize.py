@@ -41,6 +41,7 @@ def statuses(found: list[Stamped]) -> list[Status]:
     return [stamped.message.status for stamped in found if stamped.channel == MATCH]
 
 
+@pytest.mark.slow
 def test_repeated_classes_are_followed(tmp_path: Path) -> None:
     found = localized(tmp_path, LocalizeConfig())
     assert sum(stamped.channel == MAP for stamped in found) == 1
@@ -51,6 +52,7 @@ def test_repeated_classes_are_followed(tmp_path: Path) -> None:
     assert len(set(counts.values())) == 1
 
 
+@pytest.mark.slow
 def test_single_bundles_refuse_more_and_are_right(tmp_path: Path) -> None:
     alone = localized(tmp_path, LocalizeConfig(join_m=0.0))
     joined = localized(tmp_path, LocalizeConfig())
@@ -66,6 +68,7 @@ def test_unique_classes_need_no_joining(tmp_path: Path) -> None:
     assert set(refused) <= {Status.TOO_FEW_OBJECTS, Status.WEAK_GEOMETRY}
 
 
+@pytest.mark.slow
 def test_limits_make_weak_geometry(tmp_path: Path) -> None:
     for config in (LocalizeConfig(max_sigma_m=1e-6), LocalizeConfig(max_sigma_deg=1e-6)):
         for unique in (True, False):

@@ -30,6 +30,7 @@ def test_ground_repeats_and_tiles(kind: str) -> None:
         assert np.abs(smooth[0] - smooth[-1]).mean() < 1.5 * inner
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", sky.KINDS)
 def test_sky_repeats(kind: str) -> None:
     image = sky.panorama(kind, 2)

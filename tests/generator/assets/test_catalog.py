@@ -49,6 +49,7 @@ def test_classes_are_the_twelve_and_seven() -> None:
     assert len(set(catalog.COCO_ID.values())) == 12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "variant"), EVERYTHING)
 def test_same_seed_same_bytes_other_seed_others(name: str, variant: str) -> None:
     first = digest(catalog.build(name, variant, 3))

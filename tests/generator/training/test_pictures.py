@@ -15,6 +15,7 @@ from mcap_landmarks_generator.training.worlds import THESIS_CLASSES, TRAINING, j
 RECIPES = [(TRAINING, 1), (judged("empty", TRAIN_SEEDS), 1)]
 
 
+@pytest.mark.slow
 def test_a_scene_depends_on_its_index_only() -> None:
     first, again, other = scene(TRAINING, 3, 5), scene(TRAINING, 3, 5), scene(TRAINING, 3, 6)
     assert [one.object_id for one in first.objects] == [one.object_id for one in again.objects]
@@ -22,6 +23,7 @@ def test_a_scene_depends_on_its_index_only() -> None:
     assert not np.array_equal(first.views[0].eye_m, other.views[0].eye_m)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["thesis", "twelve", "empty"])
 def test_held_out_worlds_are_of_their_kind_and_look_like_nothing_trained_on(kind: str) -> None:
     one = scene(judged(kind, HELD_OUT_SEEDS), 10_000, 0)  # type: ignore[arg-type]
@@ -32,6 +34,7 @@ def test_held_out_worlds_are_of_their_kind_and_look_like_nothing_trained_on(kind
     assert all(placed.asset.seed in TRAIN_SEEDS for placed in scene(TRAINING, 1, 0).objects)
 
 
+@pytest.mark.slow
 def test_objects_stand_free_of_each_other_and_of_the_camera() -> None:
     one = scene(TRAINING, 1, 1)
     spots = np.array([placed.route_xy[0] for placed in one.objects])
@@ -42,6 +45,7 @@ def test_objects_stand_free_of_each_other_and_of_the_camera() -> None:
         assert (np.hypot(*(spots - view.eye_m[:2]).T) - reach).min() > 1.0
 
 
+@pytest.mark.slow
 def test_bearings_point_at_the_middle_of_whole_objects() -> None:
     for picture in render(scene(judged("thesis", TRAIN_SEEDS), 7_000, 0), exposed=True):
         boxes, whole = picture.labels.boxes_xyxy, picture.labels.shares == 1.0
@@ -59,6 +63,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_finished_set_is_kept_and_has_the_same_digest(folder: Path, tmp_path: Path) -> None:
     digest = PictureSet(folder).digest
     assert list(make(folder, RECIPES, seed=5)) == [2]
@@ -66,6 +71,7 @@ def test_a_finished_set_is_kept_and_has_the_same_digest(folder: Path, tmp_path: 
     assert PictureSet(folder).digest == PictureSet(tmp_path / "again").digest == digest
 
 
+@pytest.mark.slow
 def test_examples_depend_on_their_step_only_and_change_size_by_phase(folder: Path) -> None:
     phases = Phase(3, 4, 320, 320), Phase(2, 2, 480, 640)
     examples, again = (Examples(PictureSet(folder), phases, 0) for _ in range(2))
@@ -77,6 +83,7 @@ def test_examples_depend_on_their_step_only_and_change_size_by_phase(folder: Pat
     assert examples[3].images.shape == (2, 480, 640, 3)
 
 
+@pytest.mark.slow
 def test_targets_lie_in_their_example(folder: Path) -> None:
     examples = Examples(PictureSet(folder), (Phase(6, 8, 320, 320),), 1)
     targets = np.concatenate([examples[step].targets for step in range(6)])

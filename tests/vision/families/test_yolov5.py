@@ -96,6 +96,7 @@ def test_half_and_quantised_networks(tmp_path: Path, export: Export) -> None:
     np.testing.assert_array_equal(found.scores, np.array([entry[4] for entry in plain], np.float32))
 
 
+@pytest.mark.slow
 def test_an_image_of_the_stock_model(shared_data: Path) -> None:
     detector = opened(shared_data / "models" / "yolov5n-coco.onnx")
     every = np.full(80, 0.01, np.float32)
