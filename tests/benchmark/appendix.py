@@ -112,7 +112,7 @@ class _World:
         match = self._matcher.match([_scene(nearest, [self._map.classes[i] for i in rows], places[rows])])[0]
         surface_m = np.array([np.hypot(*one.positions_xy[-1]) for one in nearest])
         guess = self._map.positions_xy.mean(axis=0)
-        return _Seen(pose, match.pose, solve_position(self.group(group), surface_m, guess))
+        return _Seen(pose, match.pose, solve_position(self.group(group), surface_m, guess).position_xy)
 
 
 def _thing(name: str, at: Array, heading: float) -> Thing:

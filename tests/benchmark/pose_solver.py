@@ -70,7 +70,10 @@ def _accuracy(count: int, sigma_range_m: float, sigma_bearing_deg: float) -> Ite
 def _thesis_errors(world: Snapshots, few: slice) -> np.ndarray:
     guess = world.poses[:, :2].mean(axis=0)
     pairs = zip(world.landmarks_xy[few], world.range_m[few], strict=True)
-    return np.array([solve_position(landmarks, ranges, guess) for landmarks, ranges in pairs]) - world.poses[few, :2]
+    return (
+        np.array([solve_position(landmarks, ranges, guess).position_xy for landmarks, ranges in pairs])
+        - world.poses[few, :2]
+    )
 
 
 def _rms(errors: np.ndarray) -> float:

@@ -48,7 +48,7 @@ def _peers(world: Snapshots) -> dict[str, Callable[[int], Array]]:
     """Position (2,) of snapshot i by each of the others. The thesis starts at the middle of all robots."""
     guess = world.poses[:, :2].mean(axis=0)
     return {
-        "thesis": lambda i: solve_position(world.landmarks_xy[i], world.range_m[i], guess),
+        "thesis": lambda i: solve_position(world.landmarks_xy[i], world.range_m[i], guess).position_xy,
         "sayed": lambda i: sayed(world.landmarks_xy[i], world.range_m[i]),
         "total": lambda i: total(world.landmarks_xy[i], world.bearing_rad[i]),
         "betke_gurvits": lambda i: betke_gurvits(world.landmarks_xy[i], world.bearing_rad[i]),

@@ -24,7 +24,7 @@ Solver = Callable[[Array, Array, Array, Array], Array]
 """Position (2,) from landmarks (K, 2), ranges and bearings (K,) and the middle (2,) of all robots."""
 # The thesis's and ToTal take the first three landmarks; only the thesis's needs a guess.
 _PEERS: dict[str, Solver] = {
-    "thesis": lambda xy, distance, _bearing, guess: solve_position(xy[:3], distance[:3], guess),
+    "thesis": lambda xy, distance, _bearing, guess: solve_position(xy[:3], distance[:3], guess).position_xy,
     "sayed": lambda xy, distance, _bearing, _guess: sayed(xy, distance),
     "total": lambda xy, _distance, bearing, _guess: total(xy[:3], bearing[:3]),
     "betke_gurvits": lambda xy, _distance, bearing, _guess: betke_gurvits(xy, bearing),
@@ -79,7 +79,7 @@ def snapshot_rows(data: Path) -> Iterator[Row]:
 def _errors(given: SnapshotSet, *, calibrated: bool) -> Array:
     covariance, distance = COVARIANCE, given.range_m
     if calibrated:
-        model = calibrate(given.landmarks_xy, given.range_m, given.bearing_rad, COVARIANCE, mask=given.mask)
+        model = calibrate(given.landmarks_xy, given.range_m, given.bearing_rad, COVARIANCE, mask=given.mask).model
         covariance = COVARIANCE * np.outer(model.scale, model.scale)
         distance = model.distance_m(given.range_m, given.bearing_rad)
     solved = solve_poses(

@@ -19,7 +19,7 @@ def by_camera(world: Snapshots, offset_m: float = 0.08, depth: float = 1.0) -> S
 
 
 def found(world: Snapshots) -> SensorModel:
-    return calibrate(world.landmarks_xy, world.range_m, world.bearing_rad, world.covariance)
+    return calibrate(world.landmarks_xy, world.range_m, world.bearing_rad, world.covariance).model
 
 
 def median_error_m(world: Snapshots, range_m: Array) -> float:
@@ -63,9 +63,9 @@ def test_what_is_masked_does_not_count() -> None:
     mask[:, 4] = False
     spoilt = world.range_m.copy()
     spoilt[:, 4] = 99
-    model = calibrate(world.landmarks_xy, spoilt, world.bearing_rad, world.covariance, mask=mask)
+    model = calibrate(world.landmarks_xy, spoilt, world.bearing_rad, world.covariance, mask=mask).model
     assert model.depth == pytest.approx(1.0, abs=0.1)
-    nothing = calibrate(world.landmarks_xy, spoilt, world.bearing_rad, world.covariance, mask=np.zeros_like(mask))
+    nothing = calibrate(world.landmarks_xy, spoilt, world.bearing_rad, world.covariance, mask=np.zeros_like(mask)).model
     assert replace(nothing, scale=np.ones(0)).depth == 0
 
 

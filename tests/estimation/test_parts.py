@@ -101,8 +101,8 @@ def test_closed_form_without_weights_stays_finite() -> None:
 def test_the_thesiss_solver_finds_the_position_or_its_mirror_image() -> None:
     landmarks, position = np.array([[0.0, 0.0], [5.0, 0.01], [10.0, 0.0]]), np.array([4.0, 3.0])
     ranges = np.linalg.norm(landmarks - position, axis=1)
-    np.testing.assert_allclose(solve_position(landmarks, ranges, (4.0, 2.0)), position, atol=1e-6)
-    assert solve_position(landmarks, ranges, (4.0, -2.0))[1] < -2.9
+    np.testing.assert_allclose(solve_position(landmarks, ranges, (4.0, 2.0)).position_xy, position, atol=1e-6)
+    assert solve_position(landmarks, ranges, (4.0, -2.0)).position_xy[1] < -2.9
 
 
 def test_a_robot_that_stands_for_long_stays_where_it_is() -> None:

@@ -13,7 +13,7 @@ from tests.benchmark.snapshots import COVARIANCE, read_snapshots
 @pytest.mark.slow
 def test_a_real_cameras_ranges_are_depths_and_positions_good(shared_data: Path) -> None:
     given = read_snapshots(shared_data / "mrclam" / "mrclam1.mat")
-    model = calibrate(given.landmarks_xy, given.range_m, given.bearing_rad, COVARIANCE, mask=given.mask)
+    model = calibrate(given.landmarks_xy, given.range_m, given.bearing_rad, COVARIANCE, mask=given.mask).model
     assert 0.85 < model.depth < 1.05
     assert (model.scale < 0.6).all()
     solved = solve_poses(

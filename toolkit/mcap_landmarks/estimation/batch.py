@@ -16,7 +16,7 @@ Prepare = Callable[[slice | NDArray[np.int64]], tuple[Observations, Poses, NDArr
 
 # Observations solved together: their arrays stay in a core's cache.
 _CHUNK = 24576
-# A step shorter than this share of a standard deviation, squared, is the last one.
+# A step shorter than a thousandth of a standard deviation is the last one: its squared Mahalanobis length.
 _CONVERGED = 1e-6
 _FIRST_DAMPING = 1e-3
 # Nearly all converge within so many steps; the others are gathered and solved apart.
@@ -29,7 +29,11 @@ class PoseSolutions:
 
     `chi2` (B,) sums the squared Mahalanobis distances `observation_chi2` (B, K), `dof` (B,) is what it should be near,
     `weights` (B, K) what the robust loss left of each observation (0 where there is none). Where geometry or number of
-    observations leaves the pose open, the covariance's diagonal is infinite and `converged` (B,) is False.
+    observations leaves the pose open, the covariance's diagonal is infinite.
+
+    `converged` (B,) says whether the last step was shorter than a thousandth of a standard deviation and the pose not
+    open, `iterations` (B,) how many steps it took, `cost` (B,) the sum of losses there: `chi2`, if the loss is not
+    robust.
     """
 
     map_from_base: Array
@@ -39,6 +43,8 @@ class PoseSolutions:
     weights: Array
     observation_chi2: Array
     converged: NDArray[np.bool_]
+    iterations: NDArray[np.int64]
+    cost: Array
 
     @classmethod
     def empty(cls, count: int, width: int) -> Self:
@@ -51,6 +57,8 @@ class PoseSolutions:
             np.empty((count, width)),
             np.empty((count, width)),
             np.empty(count, dtype=np.bool_),
+            np.empty(count, dtype=np.int64),
+            np.empty(count),
         )
 
 
@@ -68,9 +76,10 @@ def solve_batch(
             part = rows[start : start + size] if len(rows) < count else slice(start, start + size)
             with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is left out
                 seen, start_poses, used = prepare(part)
-            poses, converged = _minimise(seen, start_poses, robust_dof, iterations)
+            poses, converged, steps = _minimise(seen, start_poses, robust_dof, iterations)
             fit = linearise(seen, poses, robust_dof, newton=False)
             _write(out, part, poses, converged, fit, used, robust_dof)
+            out.iterations[part] = steps
             out.dof[part] = np.maximum(numbers * used.sum(axis=0) - 3, 0)
         rows = np.flatnonzero(~out.converged)
     return out
@@ -78,13 +87,14 @@ def solve_batch(
 
 def _minimise(
     seen: Observations, start: Poses, robust_dof: float | None, max_iterations: int
-) -> tuple[Poses, NDArray[np.bool_]]:
-    """Levenberg-Marquardt on all problems, undamped while steps help; solved ones leave. Poses, and who got there."""
+) -> tuple[Poses, NDArray[np.bool_], NDArray[np.int64]]:
+    """Levenberg-Marquardt on all problems, undamped while steps help; poses, who converged, steps. Solved leave."""
     result = Poses(*(a.copy() for a in start))
     converged = np.zeros(len(start.x), dtype=np.bool_)
+    steps = np.full(len(start.x), max_iterations, dtype=np.int64)
     columns = np.arange(len(start.x))
     poses, fit, damping = start, linearise(seen, start, robust_dof), np.zeros(len(columns))
-    for _ in range(max_iterations):
+    for iteration in range(1, max_iterations + 1):
         factor = factor3(fit.information, damping)
         step = solve3(factor, fit.right)
         trial = poses.moved(step)
@@ -93,8 +103,9 @@ def _minimise(
         for whole, part in zip(result, trial, strict=True):
             whole[columns] = part
         converged[columns] = last & factor.regular
+        steps[columns[last]] = iteration
         if last.all():
-            return result, converged
+            return result, converged, steps
         if last.any():
             columns, damping, regular = columns[~last], damping[~last], factor.regular[~last]
             seen, fit = select(seen, ~last), select(fit, ~last)
@@ -109,7 +120,7 @@ def _minimise(
         damping = np.where(better & regular, damping / 10, np.maximum(damping * 10, _FIRST_DAMPING))
     for whole, part in zip(result, poses, strict=True):
         whole[columns] = part
-    return result, converged
+    return result, converged, steps
 
 
 def _write(
@@ -129,6 +140,7 @@ def _write(
     out.observation_chi2[part] = fit.chi2.T
     out.weights[part] = used.T
     out.converged[part] = converged & factor.regular
+    out.cost[part] = fit.cost
     if robust_dof is not None:
         out.weights[part] *= robust.student_weight(fit.chi2.T, robust_dof)
         factors = [robust.student_covariance_factor(robust_dof, min(1.5 / max(k, 1), 1)) for k in range(len(used) + 1)]

@@ -8,11 +8,20 @@ import scipy.sparse.linalg as sla
 from numpy.typing import NDArray
 
 from mcap_landmarks.estimation.robust import student_loss, student_weight
+from mcap_landmarks.estimation.termination import Termination
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.geometry.angles import wrap
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+MAX_ITERATIONS = 50
+"""Maps of the demo and of MRCLAM take 1 to 24."""
+TOLERANCE = 1e-6
+"""The relative fall of the cost that ends a search, as in Ceres Solver."""
+# Shares of the normal equations' diagonal: almost none at first, since starts are good; at most so much that no step
+# is left; and at least what keeps a landmark's column that hardly any weight is left of from being singular.
+_FIRST_DAMPING, _MOST_DAMPING, _LEAST_DAMPING = 1e-6, 1e6, 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,31 +122,43 @@ class Solved:
     jacobian: sp.csc_array
     factor: sla.SuperLU
     free: Ints
+    termination: Termination
 
 
-def minimise(graph: Graph, start: State, robust_dof: float, iterations: int = 50, tolerance: float = 1e-6) -> Solved:
-    """Levenberg-Marquardt with Student-t weights on the observations: a Cauchy kernel of squared width `robust_dof`."""
+def minimise(
+    graph: Graph, start: State, robust_dof: float, max_iterations: int = MAX_ITERATIONS, tolerance: float = TOLERANCE
+) -> Solved:
+    """Levenberg-Marquardt with Student-t weights on the observations: a Cauchy kernel of squared width `robust_dof`.
+
+    It ends with the iteration that lowers the cost by no more than `tolerance` of it. That alone could be a step that
+    damping made short, so it has converged only if one more whole Gauss-Newton step promises no more either (the
+    Newton decrement, Boyd and Vandenberghe 2004, section 9.5). Costs below 1 count as 1: where all fits exactly, a step
+    of a thousandth of all standard deviations is short enough.
+    """
     free = np.arange(0 if len(graph.prior_landmark) else 3, start.poses.size + start.landmarks_xy.size)
-    state, residuals, damping = start, graph.residuals(start), 1e-6
+    state, residuals, damping = start, graph.residuals(start), _FIRST_DAMPING
     cost = _cost(residuals, robust_dof)
-    for _ in range(iterations):
-        before = cost
-        system = _linearise(graph, state, residuals, robust_dof, free)
-        right = system[1].T @ np.concatenate([r.ravel() for r in _weighted(residuals, system[0])])
-        while damping < 1e6:
+    iterations, ended = 0, False
+    while iterations < max_iterations and not ended:
+        iterations, before = iterations + 1, cost
+        weight, jacobian = _linearise(graph, state, residuals, robust_dof, free)
+        right = _right(jacobian, residuals, weight)
+        while damping < _MOST_DAMPING:
             step = np.zeros(start.poses.size + start.landmarks_xy.size)
-            step[free] = _factor(system[1], damping).solve(right)
+            step[free] = _factor(jacobian, damping).solve(right)
             trial = state.plus(step)
             trial_residuals = graph.residuals(trial)
             trial_cost = _cost(trial_residuals, robust_dof)
             if trial_cost <= cost:
-                state, residuals, cost, damping = trial, trial_residuals, trial_cost, max(damping / 10, 1e-12)
+                state, residuals, cost, damping = trial, trial_residuals, trial_cost, max(damping / 10, _LEAST_DAMPING)
                 break
             damping *= 10
-        if before - cost <= tolerance * cost:
-            break
+        ended = before - cost <= tolerance * cost
     weight, jacobian = _linearise(graph, state, residuals, robust_dof, free)
-    return Solved(graph, state, weight, residuals, jacobian, _factor(jacobian, 1e-12), free)
+    factor, right = _factor(jacobian, _LEAST_DAMPING), _right(jacobian, residuals, weight)
+    promised = float(right @ factor.solve(right))
+    termination = Termination(promised <= tolerance * max(cost, 1.0), iterations, cost)
+    return Solved(graph, state, weight, residuals, jacobian, factor, free, termination)
 
 
 def _linearise(
@@ -148,8 +169,10 @@ def _linearise(
     return weight, graph.jacobian(state, weight)[:, free]
 
 
-def _weighted(residuals: tuple[Array, Array, Array], weight: Array) -> tuple[Array, Array, Array]:
-    return residuals[0] * np.sqrt(weight)[:, None], residuals[1], residuals[2]
+def _right(jacobian: sp.csc_array, residuals: tuple[Array, Array, Array], weight: Array) -> Array:
+    """Right-hand side of the normal equations."""
+    weighted = residuals[0] * np.sqrt(weight)[:, None], residuals[1], residuals[2]
+    return np.asarray(jacobian.T @ np.concatenate([r.ravel() for r in weighted]))
 
 
 def _cost(residuals: tuple[Array, Array, Array], robust_dof: float) -> float:

@@ -7,7 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 
+# All problems take so many steps: far from the landmarks' line Gauss-Newton needs five, near it each halves the error.
 _ITERATIONS = 20
+# A step shorter than a thousandth of a standard deviation is short enough: its squared Mahalanobis length.
+_CONVERGED = 1e-6
+# A step that is damped more is short whatever is left to go.
+_LITTLE_DAMPING = 1e-3
 # A determinant this small beside its matrix's diagonal is rounding noise.
 _SINGULAR = 1e-12
 
@@ -19,12 +24,17 @@ class PositionSolutions:
     The second lies on the other side of the line that the landmarks spread along; landmarks in one line leave both
     equal in `chi2`. Where the geometry leaves a position open the covariance's diagonal is infinite. `dof` (B,) is
     k - 2.
+
+    `converged` (B, 2) says whether the next step would be shorter than a thousandth of a standard deviation and the
+    position is not open, `iterations` (B, 2) after how many steps that was so; `chi2` is the cost.
     """
 
     position_xy: Array
     covariance: Array
     chi2: Array
     dof: NDArray[np.int64]
+    converged: NDArray[np.bool_]
+    iterations: NDArray[np.int64]
 
 
 def solve_ranges(
@@ -44,11 +54,10 @@ def solve_ranges(
     weight = np.where(used, 1 / np.where(used, noise, 1.0), 0.0)
     landmarks, ranges = np.where(used[..., None], landmarks, 0.0), np.where(used, ranges, 0.0)
     both = [_refine(start, landmarks, ranges, weight) for start in _mirrored_starts(landmarks, ranges, weight)]
-    position, covariance, chi2 = (np.stack(parts, axis=1) for parts in zip(*both, strict=True))
-    first = np.argsort(chi2, axis=1, kind="stable")
-    rows = np.arange(len(ranges))[:, None]
+    position, covariance, chi2, converged, steps = (np.stack(parts, axis=1) for parts in zip(*both, strict=True))
+    at = np.arange(len(ranges))[:, None], np.argsort(chi2, axis=1, kind="stable")
     dof = np.maximum(used.sum(axis=1) - 2, 0)
-    return PositionSolutions(position[rows, first], covariance[rows, first], chi2[rows, first], dof)
+    return PositionSolutions(position[at], covariance[at], chi2[at], dof, converged[at], steps[at])
 
 
 def _mirrored_starts(landmarks: Array, ranges: Array, weight: Array) -> tuple[Array, Array]:
@@ -74,14 +83,20 @@ def _mirrored_starts(landmarks: Array, ranges: Array, weight: Array) -> tuple[Ar
     return foot + height[:, None] * across, foot - height[:, None] * across
 
 
-def _refine(start: Array, landmarks: Array, ranges: Array, weight: Array) -> tuple[Array, Array, Array]:
-    """Positions (B, 2) of least chi2 near the starts, their covariance (B, 2, 2), and chi2 (B,)."""
+def _refine(
+    start: Array, landmarks: Array, ranges: Array, weight: Array
+) -> tuple[Array, Array, Array, NDArray[np.bool_], NDArray[np.int64]]:
+    """Positions (B, 2) of least chi2 near the starts, covariance (B, 2, 2), chi2, who converged, and when."""
     position, damping = start, np.full(len(start), 1e-6)
     information, right, chi2 = _normal(position, landmarks, ranges, weight)
+    steps, short = np.zeros(len(start), dtype=np.int64), np.zeros(len(start), dtype=np.bool_)
     for _ in range(_ITERATIONS):
         diagonal = np.eye(2) * information
         damped = information + damping[:, None, None] * diagonal + 1e-12 * np.eye(2)
-        trial = position + np.linalg.solve(damped, right[..., None])[..., 0]
+        step = np.linalg.solve(damped, right[..., None])[..., 0]
+        short |= ((step * right).sum(axis=1) < _CONVERGED) & (damping <= _LITTLE_DAMPING)
+        steps += ~short
+        trial = position + step
         new = _normal(trial, landmarks, ranges, weight)
         better = new[2] <= chi2
         position = np.where(better[:, None], trial, position)
@@ -91,7 +106,8 @@ def _refine(start: Array, landmarks: Array, ranges: Array, weight: Array) -> tup
     det = np.linalg.det(information)
     regular = det > _SINGULAR * information[:, 0, 0] * information[:, 1, 1]
     covariance = np.linalg.inv(np.where(regular[:, None, None], information, np.eye(2)))
-    return position, np.where(regular[:, None, None], covariance, np.diag([np.inf, np.inf])), chi2
+    covariance = np.where(regular[:, None, None], covariance, np.diag([np.inf, np.inf]))
+    return position, covariance, chi2, short & regular, steps
 
 
 def _normal(position: Array, landmarks: Array, ranges: Array, weight: Array) -> tuple[Array, Array, Array]:

@@ -40,7 +40,7 @@ def _locate(
         return Match(LandmarkMatch(scene.stamp_ns, scene.frame_id, made.status, conditions=made.conditions))
     landmarks = np.stack([position_of[name] for name in group.landmark_ids])
     range_m = np.linalg.norm(scene.positions_xy[order], axis=1)
-    position = solve_position(landmarks, range_m, config.thesis_guess_m)
+    position = solve_position(landmarks, range_m, config.thesis_guess_m).position_xy
     match = LandmarkMatch(
         scene.stamp_ns,
         scene.frame_id,

@@ -85,7 +85,7 @@ class UniqueClassLocalizer:
                 pairs.covariance,
                 landmark_covariance=pairs.landmark_covariance,
                 mask=pairs.mask,
-            )
+            ).model
         distance_m = self._sensor.distance_m(pairs.range_m, pairs.bearing_rad)
         # The log tells how range and bearing compare; in all, sigmas stay as large as they are pairs.
         shape = self._sensor.scale / self._sensor.scale.max()

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.estimation.factor_graph import Graph, Solved, State, minimise
+from mcap_landmarks.estimation.factor_graph import MAX_ITERATIONS, Graph, Solved, State, minimise
 from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, dead_reckoning, motion_covariance
 from mcap_landmarks.estimation.robust import student_loss
 from mcap_landmarks.geometry import se2
@@ -17,6 +17,8 @@ Ints = NDArray[np.int64]
 _FIRST_POSES = 30
 _GROWTH = 1.5
 _CANDIDATES = 25
+# Iterations of a stretch that the next one goes on from: a start needs no more.
+_ROUGHLY = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +124,7 @@ def solve_alone(log: LogSightings, noise: LogNoise, robust_dof: float) -> tuple[
         compact = np.cumsum(known) - 1
         graph = graph_of(part, compact[seen_rows], noise)
         whole = size == len(log)
-        solved = minimise(graph, State(poses, landmarks[known]), robust_dof, iterations=50 if whole else 8)
+        solved = minimise(graph, State(poses, landmarks[known]), robust_dof, MAX_ITERATIONS if whole else _ROUGHLY)
         if whole:
             return numbers, solved
         poses = solved.state.poses
