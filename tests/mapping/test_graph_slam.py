@@ -8,6 +8,7 @@ from mcap_landmarks.errors import MapError
 from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, dead_reckoning, motion_covariance
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.mapping.common_frame import align
+from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.graph_slam import KnownLandmarks, MapSolution, solve_map
 from mcap_landmarks.mapping.support import confirmed
 
@@ -16,6 +17,7 @@ from tests.mapping.drives import Drive, drive, landmarks_beside, with_wrong_land
 
 RADIUS_M = 12.0
 SEEDS = range(4)
+CONFIG = BuildMapConfig()
 
 
 def loop(
@@ -48,7 +50,7 @@ def test_a_loop_maps_far_better_than_its_odometry_and_says_how_well() -> None:
     misses, squares, drifts = [], [], []
     for seed in SEEDS:
         given = loop(seed)
-        solution = solve_map([given.log])
+        solution = solve_map([given.log], CONFIG)
         miss, covariance = errors(solution, given.landmarks_xy)
         misses.append(rms(miss))
         squares.append(np.einsum("li,li->l", miss, np.linalg.solve(covariance, miss[..., None])[..., 0]).mean() / 2)
@@ -65,7 +67,7 @@ def test_wrong_sightings_hardly_matter_and_lose_their_weight() -> None:
     for seed in SEEDS:
         given = loop(seed)
         spoilt = with_wrong_landmarks(given, 0.1, seed)
-        solution = solve_map([spoilt.log])
+        solution = solve_map([spoilt.log], CONFIG)
         assert rms(errors(solution, given.landmarks_xy)[0]) < 0.25
         wrong = spoilt.log.landmark != given.log.landmark
         assert np.median(solution.weights[0][wrong]) < 0.05
@@ -74,7 +76,7 @@ def test_wrong_sightings_hardly_matter_and_lose_their_weight() -> None:
 
 def test_two_logs_from_different_starts_become_one_map() -> None:
     first, second = loop(1, laps=0.7), loop(1, laps=0.7, start_rad=np.pi)
-    together = solve_map([first.log, second.log])
+    together = solve_map([first.log, second.log], CONFIG)
     assert together.number.tolist() == list(range(30))
     assert rms(errors(together, first.landmarks_xy)[0]) < 0.25
     np.testing.assert_array_equal(together.trajectories[0][0], first.log.start)
@@ -86,7 +88,7 @@ def test_a_known_map_gives_the_frame() -> None:
     given = loop(2)
     numbers = np.arange(8)
     known = KnownLandmarks(numbers, given.landmarks_xy[numbers], np.tile(1e-4 * np.eye(2), (8, 1, 1)))
-    solution = solve_map([given.log], known)
+    solution = solve_map([given.log], CONFIG, known)
     np.testing.assert_allclose(solution.landmarks_xy[:8], given.landmarks_xy[:8], atol=0.05)
     assert rms(solution.landmarks_xy - given.landmarks_xy) < 0.3
     assert (np.trace(solution.covariance[:8], axis1=1, axis2=2) < 2.1e-4).all()
@@ -98,14 +100,14 @@ def test_the_first_sighting_may_be_a_misreading() -> None:
     early = given.log.landmark.copy()
     early[:3] = 20
     assert first > 3
-    solution = solve_map([replace(given.log, landmark=early)])
+    solution = solve_map([replace(given.log, landmark=early)], CONFIG)
     assert rms(errors(solution, given.landmarks_xy)[0]) < 0.25
 
 
 def test_noise_is_found_in_the_log() -> None:
     far_too_pessimistic = loop(0, laps=3, sigma_range_m=0.02)
     doubled = replace(far_too_pessimistic.log, covariance=4 * far_too_pessimistic.log.covariance)
-    noise = solve_map([doubled]).noise[0]
+    noise = solve_map([doubled], CONFIG).noise[0]
     np.testing.assert_allclose(noise.scale, 0.5, rtol=0.2)
     assert (noise.alike < 0.35).all()
     assert 0.01 < noise.odometry.position_per_metre_m < 0.04
@@ -121,7 +123,7 @@ def test_errors_that_repeat_from_one_place_are_not_counted_as_news() -> None:
         range_m=given.log.range_m + offsets[place, given.log.landmark],
         covariance=np.tile(np.diag([0.1**2, 0.01**2]), (len(place), 1, 1)),
     )
-    noise = solve_map([log]).noise[0]
+    noise = solve_map([log], CONFIG).noise[0]
     assert noise.alike[0] > 0.7
     assert noise.alike[1] < 0.3
 
@@ -130,13 +132,13 @@ def test_errors_that_repeat_from_one_place_are_not_counted_as_news() -> None:
 def test_nothing_seen_is_an_error(logs: int) -> None:
     empty = loop(0).log.first(1)
     with pytest.raises(MapError, match="without a single landmark"):
-        solve_map([replace(empty, pose=empty.pose[:0], landmark=empty.landmark[:0])] * logs)
+        solve_map([replace(empty, pose=empty.pose[:0], landmark=empty.landmark[:0])] * logs, CONFIG)
 
 
 def test_logs_without_a_common_landmark_are_an_error() -> None:
     one, other = loop(0), loop(0)
     with pytest.raises(MapError, match="log 2 shares 0 landmarks"):
-        solve_map([one.log, replace(other.log, landmark=other.log.landmark + 100)])
+        solve_map([one.log, replace(other.log, landmark=other.log.landmark + 100)], CONFIG)
 
 
 def test_alignment_bears_wrong_points() -> None:
@@ -151,7 +153,7 @@ def test_alignment_bears_wrong_points() -> None:
 def test_landmarks_need_support_of_their_own() -> None:
     xy = np.array([[0.0, 0.0], [5.0, 0.0], [0.1, 0.05], [9.0, 9.0], [20.0, 0.0]])
     sightings = np.array([100, 80, 5, 5, 2])
-    sure = confirmed(xy, np.tile(0.01 * np.eye(2), (5, 1, 1)), sightings)
+    sure = confirmed(xy, np.tile(0.01 * np.eye(2), (5, 1, 1)), sightings, CONFIG)
     assert sure.tolist() == [True, True, False, True, False]
 
 

@@ -9,11 +9,12 @@ from mcap_landmarks.channels import SCENE_OBJECTS
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.evaluation.alignment import fit
 from mcap_landmarks.geometry.se2 import Array, compose, transform_points
+from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import Bundle
-from mcap_landmarks.stages.build_map import BuildMapConfig, collect, solve
+from mcap_landmarks.stages.build_map import collect, solve
 
 from tests.stages.worlds import circle, drive, ring
 

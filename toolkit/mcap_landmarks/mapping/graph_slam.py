@@ -8,16 +8,15 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.estimation.factor_graph import Graph, Solved, State, minimise
-from mcap_landmarks.estimation.odometry import OdometryNoise
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.mapping.common_frame import join
+from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.log_graph import LogNoise, LogSightings, graph_of, solve_alone, vote
 from mcap_landmarks.mapping.variance_components import assumed_noise, estimate_noise, places
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-DEFAULT_ODOMETRY = OdometryNoise()
 _NOISE_ROUNDS = 2
 # 99 % of right sightings lie within this squared distance.
 _INLIER = 9.21
@@ -55,30 +54,29 @@ class MapSolution:
 
 def solve_map(
     logs: Sequence[LogSightings],
+    config: BuildMapConfig,
     known: KnownLandmarks | None = None,
-    odometry: OdometryNoise = DEFAULT_ODOMETRY,
-    robust_dof: float = 1.0,
 ) -> MapSolution:
     """Optimise the poses of all logs and the landmarks they saw (thesis Algorithm 4's task, as a pose-landmark graph).
 
-    Each log is solved alone, its noise estimated, then all are joined by the landmarks they share. `odometry` is where
-    the estimate of each log's odometry noise starts. `robust_dof`: see `graph_system.minimise`.
+    Each log is solved alone, its noise estimated, then all are joined by the landmarks they share.
 
     Raises:
         MapError: no log, a log without a sighting, or one that shares fewer than two landmarks with the others.
     """
     if not logs or not all(len(log.pose) for log in logs):
         raise MapError("a log without a single landmark sighting cannot be mapped; leave it out")
-    alone = [_solve_with_its_noise(log, odometry, robust_dof) for log in logs]
+    alone = [_solve_with_its_noise(log, config) for log in logs]
     parts = [(numbers, solved.state.landmarks_xy) for numbers, solved, _ in alone]
     transforms, numbers, landmarks = join(parts, None if known is None else (known.number, known.xy))
     pairs = zip(transforms, alone, strict=True)
     poses = np.concatenate([se2.compose(transform, solved.state.poses) for transform, (_, solved, _) in pairs])
     noise = tuple(n for _, _, n in alone)
     graph = _stack(logs, noise, numbers, known)
-    solved = minimise(graph, State(poses, landmarks), robust_dof)
+    solved = minimise(graph, State(poses, landmarks), config.robust_dof, config.max_iterations)
     if len(logs) > 1:
-        solved = minimise(graph, _vote_again(logs, graph, solved.state, robust_dof), robust_dof)
+        start = _vote_again(logs, graph, solved.state, config.robust_dof)
+        solved = minimise(graph, start, config.robust_dof, config.max_iterations)
     lengths, counts = [len(log) for log in logs], [len(log.pose) for log in logs]
     squares = (solved.residuals[0] ** 2).sum(axis=1) * solved.weight
     return MapSolution(
@@ -93,16 +91,14 @@ def solve_map(
     )
 
 
-def _solve_with_its_noise(
-    log: LogSightings, odometry: OdometryNoise, robust_dof: float
-) -> tuple[Ints, Solved, LogNoise]:
+def _solve_with_its_noise(log: LogSightings, config: BuildMapConfig) -> tuple[Ints, Solved, LogNoise]:
     place = places(log)
-    noise = assumed_noise(place, odometry)
-    numbers, solved = solve_alone(log, noise, robust_dof)
+    noise = assumed_noise(place, config.odometry)
+    numbers, solved = solve_alone(log, noise, config)
     rows = np.searchsorted(numbers, log.landmark)
     for _ in range(_NOISE_ROUNDS):
         noise = estimate_noise(log, place, noise.odometry, solved)
-        solved = minimise(graph_of(log, rows, noise), solved.state, robust_dof)
+        solved = minimise(graph_of(log, rows, noise), solved.state, config.robust_dof, config.max_iterations)
     return numbers, solved, noise
 
 

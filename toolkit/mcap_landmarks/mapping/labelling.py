@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, motion_covariance
 from mcap_landmarks.geometry.se2 import Array, between, transform_points
+from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.data_association import UNLABELLED, Labels, label_observations
 from mcap_landmarks.mapping.observations import LogObservations
 
@@ -33,14 +34,14 @@ def motions_of(log: LogObservations) -> Motions:
     return Motions(between(poses[:-1], poses[1:]), np.diff(log.way_m), np.diff(log.turned_rad))
 
 
-def label_log(log: LogObservations, kinds: NDArray[np.int64], noise: OdometryNoise, slack: float) -> LocalMap:
+def label_log(log: LogObservations, kinds: NDArray[np.int64], config: BuildMapConfig) -> LocalMap:
     """Label a log's observations, whose classes have the numbers kinds (N,).
 
     Tried at several scales of the odometry noise; the scale of the highest evidence wins. `slack` widens the
     observations' sigmas: sensors err more than they say, and a gate that is too tight splits landmarks in two.
     """
-    motions = motions_of(log)
-    widened = log.covariances * slack**2
+    motions, noise = motions_of(log), config.odometry
+    widened = log.covariances * config.slack**2
     best: Labels | None = None
     for scale in _SCALES:
         scaled = OdometryNoise(

@@ -1,15 +1,14 @@
 """The default way to build a map: label what was seen, join the logs, solve poses and landmarks together."""
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import MapError
-from mcap_landmarks.estimation.odometry import OdometryNoise
 from mcap_landmarks.estimation.polar import polar_from_points
 from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.data_association import UNLABELLED
 from mcap_landmarks.mapping.graph_slam import KnownLandmarks, MapSolution, solve_map
 from mcap_landmarks.mapping.groups import groups_of
@@ -26,31 +25,8 @@ Ints = NDArray[np.int64]
 _WRONG = 0.1
 
 
-class Settings(Protocol):
-    """What of the stage's configuration is used here."""
-
-    @property
-    def range_sigma_m(self) -> float: ...
-    @property
-    def odometry_position_m(self) -> float: ...
-    @property
-    def odometry_heading_rad(self) -> float: ...
-    @property
-    def odometry_turning_rad(self) -> float: ...
-    @property
-    def slack(self) -> float: ...
-    @property
-    def robust_dof(self) -> float: ...
-    @property
-    def min_sightings(self) -> int: ...
-    @property
-    def misread_share(self) -> float: ...
-    @property
-    def join_tolerance_m(self) -> float: ...
-
-
 def solve_jointly(
-    logs: Sequence[LogObservations], prior: LandmarkMap | None, settings: Settings
+    logs: Sequence[LogObservations], prior: LandmarkMap | None, config: BuildMapConfig
 ) -> tuple[LandmarkMap, list[Trajectory]]:
     """One map of all logs, on top of `prior` where there is one, and each log's trajectory in it.
 
@@ -62,20 +38,19 @@ def solve_jointly(
         raise MapError(f"log {', '.join(empty)} holds no object in any bundle with odometry; leave it out")
     names = sorted({name for log in logs for name in log.classes} | set(prior.classes if prior else ()))
     kind_of = {name: kind for kind, name in enumerate(names)}
-    noise = OdometryNoise(settings.odometry_position_m, settings.odometry_heading_rad, settings.odometry_turning_rad)
     kinds = [np.array([kind_of[name] for name in log.classes], dtype=np.int64) for log in logs]
-    local = [label_log(log, kind, noise, settings.slack) for log, kind in zip(logs, kinds, strict=True)]
+    local = [label_log(log, kind, config) for log, kind in zip(logs, kinds, strict=True)]
     known = None
     if prior is not None:
         known = np.array([kind_of[name] for name in prior.classes], dtype=np.int64), prior.positions_xy
-    numbering = number_landmarks(local, known, settings.join_tolerance_m)
+    numbering = number_landmarks(local, known, config)
     numbers = [
         np.where(part.landmark == UNLABELLED, UNLABELLED, of_log[part.landmark])
         for part, of_log in zip(local, numbering.of_log, strict=True)
     ]
     sightings = [_sightings(log, number) for log, number in zip(logs, numbers, strict=True)]
-    solution = solve_map(sightings, _known(prior, settings), noise, settings.robust_dof)
-    landmark_map = _map_of(logs, numbers, numbering, solution, names, prior, settings)
+    solution = solve_map(sightings, config, _known(prior, config))
+    landmark_map = _map_of(logs, numbers, numbering, solution, names, prior, config)
     trajectories = [
         Trajectory(log.stamps_ns, log.log_times_ns, poses)
         for log, poses in zip(logs, solution.trajectories, strict=True)
@@ -89,11 +64,11 @@ def _sightings(log: LogObservations, number: Ints) -> LogSightings:
     return LogSightings(log.odom_from_base[0], motions_of(log), log.bundle[seen], number[seen], *polar)
 
 
-def _known(prior: LandmarkMap | None, settings: Settings) -> KnownLandmarks | None:
+def _known(prior: LandmarkMap | None, config: BuildMapConfig) -> KnownLandmarks | None:
     if prior is None:
         return None
     unknown: NDArray[np.bool_] = np.logical_not(prior.covariances.any(axis=(1, 2)))
-    covariances = np.where(unknown[:, None, None], settings.range_sigma_m**2 * np.eye(2), prior.covariances)
+    covariances = np.where(unknown[:, None, None], config.range_sigma_m**2 * np.eye(2), prior.covariances)
     return KnownLandmarks(np.arange(len(prior)), prior.positions_xy, covariances)
 
 
@@ -104,7 +79,7 @@ def _map_of(
     solution: MapSolution,
     names: Sequence[str],
     prior: LandmarkMap | None,
-    settings: Settings,
+    config: BuildMapConfig,
 ) -> LandmarkMap:
     """The solved landmarks with how often, how large and in which groups they were seen."""
     radii, measured = np.zeros(len(numbering.kinds)), np.zeros(len(numbering.kinds), dtype=np.int64)
@@ -125,7 +100,7 @@ def _map_of(
         sightings[: len(prior)] += prior.sightings
         radius[: len(prior)] = np.where(measured[: len(prior)] > 0, radius[: len(prior)], prior.radii_m)
     covariances = _definite(solution.covariance)
-    sure = confirmed(solution.landmarks_xy, covariances, sightings, settings.min_sightings, settings.misread_share)
+    sure = confirmed(solution.landmarks_xy, covariances, sightings, config)
     if prior is not None:
         sure[: len(prior)] |= ~prior.tentative
     name_of = {int(number): ids[i] for i, number in enumerate(row) if sure[i]}

@@ -6,10 +6,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.estimation.factor_graph import MAX_ITERATIONS, Graph, Solved, State, minimise
+from mcap_landmarks.estimation.factor_graph import Graph, Solved, State, minimise
 from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, dead_reckoning, motion_covariance
 from mcap_landmarks.estimation.robust import student_loss
 from mcap_landmarks.geometry import se2
+from mcap_landmarks.mapping.config import BuildMapConfig
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -103,7 +104,7 @@ def graph_of(log: LogSightings, landmark_rows: Ints, noise: LogNoise) -> Graph:
     )
 
 
-def solve_alone(log: LogSightings, noise: LogNoise, robust_dof: float) -> tuple[Ints, Solved]:
+def solve_alone(log: LogSightings, noise: LogNoise, config: BuildMapConfig) -> tuple[Ints, Solved]:
     """Landmark numbers (L,) of a log and the minimum of its graph, in the frame of its odometry.
 
     Grows from the first poses on: each stretch starts by dead reckoning from what is already solved, so drift never
@@ -119,12 +120,13 @@ def solve_alone(log: LogSightings, noise: LogNoise, robust_dof: float) -> tuple[
         rest = Motions(m.relative[behind:], m.distance_m[behind:], m.turn_rad[behind:])
         poses = np.concatenate([poses[:-1], dead_reckoning(poses[-1], rest)])
         seen_rows = rows[: len(part.pose)]
-        landmarks = vote(part.points_xy(poses), part.variance(), seen_rows, landmarks, robust_dof)
+        landmarks = vote(part.points_xy(poses), part.variance(), seen_rows, landmarks, config.robust_dof)
         known = np.isfinite(landmarks[:, 0])
         compact = np.cumsum(known) - 1
         graph = graph_of(part, compact[seen_rows], noise)
         whole = size == len(log)
-        solved = minimise(graph, State(poses, landmarks[known]), robust_dof, MAX_ITERATIONS if whole else _ROUGHLY)
+        iterations = config.max_iterations if whole else _ROUGHLY
+        solved = minimise(graph, State(poses, landmarks[known]), config.robust_dof, iterations)
         if whole:
             return numbers, solved
         poses = solved.state.poses

@@ -5,23 +5,27 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from mcap_landmarks.geometry.se2 import Array, transform_points
+from mcap_landmarks.mapping.config import BuildMapConfig
 
-_NEAR_M, _FAR_M = 0.5, 20.0
+_NEAR_M = 0.5
 _LIKE_M = 0.5
+# Classes so far apart in the search tree, in the same unit as lengths, are never like each other.
+_APART = 200.0
 _TRIED = 20_000
 _FEWEST = 3
 
 
 def align_maps(
-    kinds: NDArray[np.int64], points_xy: Array, map_kinds: NDArray[np.int64], map_xy: Array, tolerance_m: float
+    kinds: NDArray[np.int64], points_xy: Array, map_kinds: NDArray[np.int64], map_xy: Array, config: BuildMapConfig
 ) -> Array | None:
     """map_from_local (3,) under which most of the landmarks (N, 2) fall on map landmarks (M, 2) of their class.
 
-    Every pair of landmarks that stand 0.5 to 20 m apart is laid on every pair of the map of the same classes and
-    length; the pose with most landmarks within `tolerance_m` of a partner wins. None if fewer than three (two, where
-    the map's classes are all different) fit, or another pose fits as many.
+    Every pair of landmarks that stand half a metre to `join_reach_m` apart is laid on every pair of the map of the same
+    classes and length; the pose with most landmarks within `join_tolerance_m` of a partner wins. None if fewer than
+    three (two, where the map's classes are all different) fit, or another pose fits as many.
     """
-    mine, theirs = _pairs(kinds, points_xy), _pairs(map_kinds, map_xy)
+    reach_m, tolerance_m = config.join_reach_m, config.join_tolerance_m
+    mine, theirs = _pairs(kinds, points_xy, reach_m), _pairs(map_kinds, map_xy, reach_m)
     poses = _hypotheses(kinds, points_xy, mine, map_kinds, map_xy, theirs)
     if not len(poses):
         return None
@@ -38,9 +42,9 @@ def align_maps(
     return pose
 
 
-def _pairs(kinds: NDArray[np.int64], points_xy: Array) -> NDArray[np.int64]:
+def _pairs(kinds: NDArray[np.int64], points_xy: Array, reach_m: float) -> NDArray[np.int64]:
     """Ordered pairs (P, 2) of rows whose distance says something about direction."""
-    near = cKDTree(points_xy).query_pairs(_FAR_M, output_type="ndarray") if len(points_xy) else np.zeros((0, 2), int)
+    near = cKDTree(points_xy).query_pairs(reach_m, output_type="ndarray") if len(points_xy) else np.zeros((0, 2), int)
     pairs = np.concatenate([near, near[:, ::-1]]).astype(np.int64)
     length = np.linalg.norm(points_xy[pairs[:, 0]] - points_xy[pairs[:, 1]], axis=1)
     pairs = pairs[(length > _NEAR_M) & (kinds[pairs[:, 0]] <= kinds[pairs[:, 1]])]
@@ -57,11 +61,10 @@ def _hypotheses(
     theirs: NDArray[np.int64],
 ) -> Array:
     """Poses (H, 3) that lay one of `mine` on one of `theirs`; evenly thinned where there are too many."""
-    span = 10.0 * max(_FAR_M, 1.0)
 
     def features(of_kinds: NDArray[np.int64], at: Array, pairs: NDArray[np.int64]) -> Array:
         length = np.linalg.norm(at[pairs[:, 0]] - at[pairs[:, 1]], axis=1)
-        return np.column_stack([span * of_kinds[pairs], length])
+        return np.column_stack([_APART * of_kinds[pairs], length])
 
     if not len(mine) or not len(theirs):
         return np.zeros((0, 3))

@@ -9,6 +9,7 @@ from scipy.optimize import linear_sum_assignment
 
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.se2 import Array, transform_points
+from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.labelling import LocalMap
 from mcap_landmarks.mapping.map_alignment import align_maps
 
@@ -24,11 +25,11 @@ class Numbering:
     of_log: tuple[Ints, ...]
 
 
-def number_landmarks(logs: Sequence[LocalMap], known: tuple[Ints, Array] | None, tolerance_m: float) -> Numbering:
+def number_landmarks(logs: Sequence[LocalMap], known: tuple[Ints, Array] | None, config: BuildMapConfig) -> Numbering:
     """Number the landmarks of all logs; those of a map that exists already, `known` (Q,) and (Q, 2), come first.
 
-    Logs join one by one, whichever can be laid on what is there; landmarks of a class within three times `tolerance_m`
-    of each other are then the same one.
+    Logs join one by one, whichever can be laid on what is there; landmarks of a class within three times
+    `join_tolerance_m` of each other are then the same one.
 
     Raises:
         MapError: a log cannot be laid on the others, or fits in several ways.
@@ -44,11 +45,11 @@ def number_landmarks(logs: Sequence[LocalMap], known: tuple[Ints, Array] | None,
             local = logs[i]
             seen = np.bincount(local.landmark[local.landmark >= 0], minlength=len(local.kinds))
             firm = seen >= min(3, seen.max(initial=0))
-            pose = align_maps(local.kinds[firm], local.positions_xy[firm], kinds, positions, tolerance_m)
+            pose = align_maps(local.kinds[firm], local.positions_xy[firm], kinds, positions, config)
             if pose is None:
                 continue
             there = transform_points(pose, local.positions_xy)
-            numbers[i] = _match(local.kinds, there, kinds, positions, 3 * tolerance_m)
+            numbers[i] = _match(local.kinds, there, kinds, positions, 3 * config.join_tolerance_m)
             new = numbers[i] >= len(kinds)
             kinds = np.concatenate([kinds, local.kinds[new]])
             positions = np.concatenate([positions, there[new]])

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from mcap_landmarks.mapping.config import BuildMapConfig
+
 Array = NDArray[np.float64]
 
 # Squared distance (2 degrees of freedom) within which two landmarks may be one.
@@ -10,14 +12,15 @@ _SAME_PLACE = 9.21
 
 
 def confirmed(
-    landmarks_xy: Array, covariance: Array, sightings: NDArray[np.int64], least: int = 3, share: float = 0.1
+    landmarks_xy: Array, covariance: Array, sightings: NDArray[np.int64], config: BuildMapConfig
 ) -> NDArray[np.bool_]:
     """Which of L landmarks (L, 2) with covariance (L, 2, 2) are supported well enough by fitting sightings (L,).
 
-    Fewer than `least` are too few. One with less than `share` of the sightings of another that stands where it stands,
-    as far as both covariances tell, is taken for a misreading of that one's class.
+    Fewer than `min_sightings` are too few. One with less than `misread_share` of the sightings of another that stands
+    where it stands, as far as both covariances tell, is taken for a misreading of that one's class.
     """
-    sure = sightings >= least
+    share = config.misread_share
+    sure = sightings >= config.min_sightings
     for weak in np.flatnonzero(sure & (sightings < share * sightings.max(initial=0))):
         rivals = np.flatnonzero(share * sightings > sightings[weak])
         gap = landmarks_xy[rivals] - landmarks_xy[weak]

@@ -1,45 +1,18 @@
 """Build a landmark map from scene objects and odometry of one or several logs."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from mcap_landmarks.channels import MAP_MARKERS, MAP_PATH, MAP_POSE, ODOMETRY, SCENE_OBJECTS
 from mcap_landmarks.errors import MapError
+from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.landmark_slam import solve_jointly
 from mcap_landmarks.mapping.observations import LogObservations, Trajectory
 from mcap_landmarks.mapping.thesis import solve_as_in_the_thesis
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.maps.scene_objects import known_covariances
 from mcap_landmarks.stage import Bundle, Reduction, Tolerance
-
-
-@dataclass(frozen=True, slots=True)
-class BuildMapConfig:
-    """How a map is built.
-
-    `range_sigma_m` and `bearing_sigma_rad` stand in for covariances that the log leaves unknown. Odometry noise per
-    square root of a metre (`odometry_position_m`, `odometry_heading_rad`) or of a radian (`odometry_turning_rad`) is a
-    first guess; the log itself tells the rest. `slack` widens the observations' sigmas while they are labelled.
-    `robust_dof`: degrees of the Student-t distribution of the joint solution. A landmark with fewer fitting sightings
-    than `min_sightings` is tentative, and so is one that stands where another does and was seen less than
-    `misread_share` times as often: it is that one under a wrong class. Logs join if their landmarks agree within
-    `join_tolerance_m`.
-    """
-
-    method: Literal["default", "thesis"] = "default"
-    range_sigma_m: float = 0.05
-    bearing_sigma_rad: float = 0.01
-    odometry_position_m: float = 0.05
-    odometry_heading_rad: float = 0.05
-    odometry_turning_rad: float = 0.1
-    slack: float = 1.7
-    robust_dof: float = 1.0
-    min_sightings: int = 3
-    misread_share: float = 0.1
-    join_tolerance_m: float = 0.6
 
 
 def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservations:
