@@ -51,7 +51,7 @@ def aligned_rmse(landmark_map: LandmarkMap, classes: tuple[str, ...], positions:
 def test_a_loop_with_repeated_classes_closes() -> None:
     classes, positions = ring()
     log = observe(drive(circle(), classes, positions, seed=1), CONFIG)
-    landmark_map, trajectories = solve([log], None, CONFIG)
+    landmark_map, trajectories, _ = solve([log], None, CONFIG)
     assert sorted(np.array(landmark_map.classes)[~landmark_map.tentative]) == sorted(classes)
     assert aligned_rmse(landmark_map, classes, positions) < 0.03
     truth = circle()
@@ -70,7 +70,7 @@ def test_two_logs_make_one_map() -> None:
         observe(drive(circle(0.7), classes, positions, seed=2), CONFIG),
         observe(drive(circle(-0.7), classes, positions, seed=3), CONFIG),
     ]
-    landmark_map, _ = solve(logs, None, CONFIG)
+    landmark_map, *_ = solve(logs, None, CONFIG)
     assert sorted(np.array(landmark_map.classes)[~landmark_map.tentative]) == sorted(classes)
     assert aligned_rmse(landmark_map, classes, positions) < 0.05
     assert [source.bundles for source in landmark_map.sources] == [240, 240]
@@ -79,9 +79,9 @@ def test_two_logs_make_one_map() -> None:
 @pytest.mark.slow
 def test_a_prior_keeps_its_frame_and_ids() -> None:
     classes, positions = ring()
-    first, _ = solve([observe(drive(circle(0.6), classes, positions, seed=4), CONFIG)], None, CONFIG)
+    first, *_ = solve([observe(drive(circle(0.6), classes, positions, seed=4), CONFIG)], None, CONFIG)
     log = observe(drive(circle(1.0), classes, positions, seed=5), CONFIG)
-    second, _ = solve([log], first, CONFIG)
+    second, *_ = solve([log], first, CONFIG)
     assert second.ids[: len(first)] == first.ids
     assert np.linalg.norm(second.positions_xy[: len(first)] - first.positions_xy, axis=1).max() < 0.1
     assert (~second.tentative).sum() == len(classes)
@@ -110,7 +110,7 @@ def test_a_misread_class_is_tentative() -> None:
 
     log = observe(map(misread, drive(circle(), classes, positions, seed=9)), CONFIG)
     assert "trolley" in log.classes
-    landmark_map, _ = solve([log], None, CONFIG)
+    landmark_map, *_ = solve([log], None, CONFIG)
     confirmed = np.array(landmark_map.classes)[~landmark_map.tentative]
     assert sorted(confirmed) == sorted(classes)
 
@@ -138,7 +138,7 @@ def test_the_thesis_method_keeps_ordered_triples() -> None:
     config = BuildMapConfig(method="thesis")
     classes, positions = ring()
     log = observe(drive(circle(), classes, positions, seed=14), config)
-    landmark_map, _ = solve([log], None, config)
+    landmark_map, *_ = solve([log], None, config)
     triples = [
         tuple(landmark_map.classes[landmark_map.ids.index(name)] for name in g.landmark_ids)
         for g in landmark_map.groups

@@ -255,8 +255,8 @@ class Stage:
 class Reduction:
     """The step that makes one result of many logs: `collect` per log, then `solve` over what was collected.
 
-    `collect(bundles, config)` gives one log's observations, `solve(observations, prior, config)` the map and one
-    trajectory per log. A log must have every channel of `reads`.
+    `collect(bundles, config)` gives one log's observations, `solve(observations, prior, config)` the map, one
+    trajectory per log, and how the solver ended. A log must have every channel of `reads`.
     """
 
     name: str

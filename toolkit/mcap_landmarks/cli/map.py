@@ -48,6 +48,7 @@ def command(
     run = _build(logs, database, prior, output, asked)
     for log in run.logs:
         tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)
+    tell(map_file, (), run.build.outcome.notes, ())
     if given.json:
         say_json("map", _document(run, database))
     else:
@@ -89,6 +90,8 @@ def _stages(run: "MapRun", log: "MappedLog") -> "list[StageRun]":
 
 
 def _document(run: "MapRun", database: Path) -> dict[str, object]:
+    import dataclasses
+
     tentative = int(run.landmark_map.tentative.sum())
     states: dict[str, str] = {}
     for log in run.logs:
@@ -110,6 +113,7 @@ def _document(run: "MapRun", database: Path) -> dict[str, object]:
             for log, source in zip(run.logs, run.sources, strict=True)
         ],
         "stages": states,
+        **({"solver": dataclasses.asdict(run.termination)} if run.termination else {}),
     }
 
 

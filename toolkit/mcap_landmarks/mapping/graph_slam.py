@@ -1,23 +1,28 @@
 """A landmark map from several logs: poses and landmarks optimised together, robustly, with honest covariances."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.estimation.factor_graph import Graph, Solved, State, minimise
+from mcap_landmarks.estimation.termination import Termination
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.mapping.common_frame import join
 from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.log_graph import LogNoise, LogSightings, graph_of, solve_alone, vote
-from mcap_landmarks.mapping.variance_components import assumed_noise, estimate_noise, places
+from mcap_landmarks.mapping.variance_components import assumed_noise, estimate_noise, largest_change, places
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# Stopped early on purpose: every round believes its start as much as 200 residuals, so that few rounds keep a log that
+# says little near what was assumed, and many would not.
 _NOISE_ROUNDS = 2
+# Sigmas that a round changes by less than this share of themselves have settled.
+_SETTLED = 0.05
 # 99 % of right sightings lie within this squared distance.
 _INLIER = 9.21
 _COLUMNS_AT_ONCE = 200
@@ -39,7 +44,8 @@ class MapSolution:
     Per log: poses (N, 3), robust weights (M,), and the noise found. A weight near 0 means that a sighting was taken for
     wrong. Without known landmarks the frame is the first log's, with its first pose as given, and covariances are those
     of a map free to shift and turn as a whole: what remains between landmarks. `chi2` sums the squared whitened
-    residuals times their weights.
+    residuals times their weights. `termination` tells how the last solution of all logs ended, with the iterations of
+    whichever on the way to it took most, `noise_terminations` how the search for each log's noise did.
     """
 
     number: Ints
@@ -50,6 +56,8 @@ class MapSolution:
     weights: tuple[Array, ...]
     noise: tuple[LogNoise, ...]
     chi2: float
+    termination: Termination
+    noise_terminations: tuple[Termination, ...]
 
 
 def solve_map(
@@ -62,21 +70,25 @@ def solve_map(
     Each log is solved alone, its noise estimated, then all are joined by the landmarks they share.
 
     Raises:
-        MapError: no log, a log without a sighting, or one that shares fewer than two landmarks with the others.
+        MapError: no log, a log without a sighting, one that shares fewer than two landmarks with the others, or no
+            convergence.
     """
     if not logs or not all(len(log.pose) for log in logs):
         raise MapError("a log without a single landmark sighting cannot be mapped; leave it out")
     alone = [_solve_with_its_noise(log, config) for log in logs]
-    parts = [(numbers, solved.state.landmarks_xy) for numbers, solved, _ in alone]
+    parts = [(log.numbers, log.solved.state.landmarks_xy) for log in alone]
     transforms, numbers, landmarks = join(parts, None if known is None else (known.number, known.xy))
     pairs = zip(transforms, alone, strict=True)
-    poses = np.concatenate([se2.compose(transform, solved.state.poses) for transform, (_, solved, _) in pairs])
-    noise = tuple(n for _, _, n in alone)
+    poses = np.concatenate([se2.compose(transform, log.solved.state.poses) for transform, log in pairs])
+    noise = tuple(log.noise for log in alone)
     graph = _stack(logs, noise, numbers, known)
     solved = minimise(graph, State(poses, landmarks), config.robust_dof, config.max_iterations)
+    most = max(solved.termination.iterations, *(log.iterations for log in alone))
     if len(logs) > 1:
         start = _vote_again(logs, graph, solved.state, config.robust_dof)
         solved = minimise(graph, start, config.robust_dof, config.max_iterations)
+    termination = replace(solved.termination, iterations=max(most, solved.termination.iterations))
+    _check(termination, len(logs))
     lengths, counts = [len(log) for log in logs], [len(log.pose) for log in logs]
     squares = (solved.residuals[0] ** 2).sum(axis=1) * solved.weight
     return MapSolution(
@@ -88,18 +100,53 @@ def solve_map(
         tuple(np.split(solved.weight, np.cumsum(counts)[:-1])),
         noise,
         float(squares.sum() + (solved.residuals[1] ** 2).sum() + (solved.residuals[2] ** 2).sum()),
+        termination,
+        tuple(log.termination for log in alone),
     )
 
 
-def _solve_with_its_noise(log: LogSightings, config: BuildMapConfig) -> tuple[Ints, Solved, LogNoise]:
+def _check(ended: Termination, logs: int) -> None:
+    """Refuse a graph that has not converged.
+
+    Raises:
+        MapError: as it says.
+    """
+    if not ended.converged:
+        fewer = "map fewer logs at once, " if logs > 1 else ""
+        raise MapError(
+            f"poses and landmarks did not converge in {ended.iterations} iterations; {fewer}check the odometry "
+            "(`info --check`), or set a larger build_map.max_iterations or, where odometry is worse than that, "
+            "build_map.odometry_heading_rad"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _LogSolution:
+    """One log on its own: its landmarks' numbers, the minimum, the noise found, and how the search for that ended.
+
+    `iterations`: of the solution on the way that took most.
+    """
+
+    numbers: Ints
+    solved: Solved
+    noise: LogNoise
+    termination: Termination
+    iterations: int
+
+
+def _solve_with_its_noise(log: LogSightings, config: BuildMapConfig) -> _LogSolution:
     place = places(log)
     noise = assumed_noise(place, config.odometry)
     numbers, solved = solve_alone(log, noise, config)
     rows = np.searchsorted(numbers, log.landmark)
+    before, iterations = noise, solved.termination.iterations
     for _ in range(_NOISE_ROUNDS):
-        noise = estimate_noise(log, place, noise.odometry, solved)
+        before, noise = noise, estimate_noise(log, place, noise.odometry, solved)
         solved = minimise(graph_of(log, rows, noise), solved.state, config.robust_dof, config.max_iterations)
-    return numbers, solved, noise
+        iterations = max(iterations, solved.termination.iterations)
+    settled = largest_change(before, noise) <= _SETTLED
+    ended = Termination(settled, _NOISE_ROUNDS, solved.termination.cost)
+    return _LogSolution(numbers, solved, noise, ended, iterations)
 
 
 def _stack(

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.estimation.polar import polar_from_points
 from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.mapping.built_map import BuiltMap, Trajectory
 from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.data_association import UNLABELLED
 from mcap_landmarks.mapping.graph_slam import KnownLandmarks, MapSolution, solve_map
@@ -15,7 +16,7 @@ from mcap_landmarks.mapping.groups import groups_of
 from mcap_landmarks.mapping.labelling import label_log, motions_of
 from mcap_landmarks.mapping.log_graph import LogSightings
 from mcap_landmarks.mapping.merge_logs import Numbering, number_landmarks
-from mcap_landmarks.mapping.observations import LogObservations, Trajectory
+from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.mapping.support import confirmed
 from mcap_landmarks.maps.model import LandmarkMap, Source
 
@@ -25,13 +26,11 @@ Ints = NDArray[np.int64]
 _WRONG = 0.1
 
 
-def solve_jointly(
-    logs: Sequence[LogObservations], prior: LandmarkMap | None, config: BuildMapConfig
-) -> tuple[LandmarkMap, list[Trajectory]]:
+def solve_jointly(logs: Sequence[LogObservations], prior: LandmarkMap | None, config: BuildMapConfig) -> BuiltMap:
     """One map of all logs, on top of `prior` where there is one, and each log's trajectory in it.
 
     Raises:
-        MapError: a log has nothing to map, or cannot be joined to the others.
+        MapError: a log has nothing to map or cannot be joined to the others, or the solver did not converge.
     """
     empty = [str(i + 1) for i, log in enumerate(logs) if not len(log.bundle)]
     if empty:
@@ -55,7 +54,7 @@ def solve_jointly(
         Trajectory(log.stamps_ns, log.log_times_ns, poses)
         for log, poses in zip(logs, solution.trajectories, strict=True)
     ]
-    return landmark_map, trajectories
+    return BuiltMap(landmark_map, trajectories, solution.termination)
 
 
 def _sightings(log: LogObservations, number: Ints) -> LogSightings:

@@ -37,15 +37,6 @@ class LogObservations:
         return np.arange(first, last)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Trajectory:
-    """Where a log's robot was: stamps and log times (T,), map_from_base (T, 3)."""
-
-    stamps_ns: NDArray[np.int64]
-    log_times_ns: NDArray[np.int64]
-    map_from_base: Array
-
-
 def left_to_right(points_xy: Array) -> NDArray[np.int64]:
     """Order (N,) of points (N, 2) from left to right as seen from the origin, about their mean direction."""
     bearing = np.arctan2(points_xy[:, 1], points_xy[:, 0])

@@ -7,7 +7,8 @@ import numpy as np
 
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.se2 import Array, transform_points
-from mcap_landmarks.mapping.observations import LogObservations, Trajectory, left_to_right
+from mcap_landmarks.mapping.built_map import BuiltMap, Trajectory
+from mcap_landmarks.mapping.observations import LogObservations, left_to_right
 from mcap_landmarks.maps.model import Group, LandmarkMap, Source
 
 
@@ -20,7 +21,7 @@ class _Triangle:
     sightings: int
 
 
-def solve_as_in_the_thesis(logs: Sequence[LogObservations]) -> tuple[LandmarkMap, list[Trajectory]]:
+def solve_as_in_the_thesis(logs: Sequence[LogObservations]) -> BuiltMap:
     """Landmarks of every group of three whose ordered classes were not seen before; seen again, it is replaced.
 
     Heading and bearing both turn the observation (decisions on Algorithm 4); the map frame is the odometry's.
@@ -46,7 +47,7 @@ def solve_as_in_the_thesis(logs: Sequence[LogObservations]) -> tuple[LandmarkMap
         trajectories.append(Trajectory(log.stamps_ns, log.log_times_ns, log.odom_from_base))
     if not groups:
         raise MapError("no bundle has exactly three objects, which the thesis's method needs; use method = default")
-    return _map_of(groups, tuple(sources)), trajectories
+    return BuiltMap(_map_of(groups, tuple(sources)), trajectories, None)
 
 
 def _map_of(groups: dict[tuple[str, ...], _Triangle], sources: tuple[Source, ...]) -> LandmarkMap:

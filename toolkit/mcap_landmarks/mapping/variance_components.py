@@ -1,5 +1,7 @@
 """How noisy a log really is: sensor, odometry, and how alike the errors of sightings from one place are."""
 
+from dataclasses import astuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -59,6 +61,12 @@ def estimate_noise(log: LogSightings, place: Ints, odometry: OdometryNoise, solv
         odometry.heading_per_radian_rad * heading,
     )
     return LogNoise(grown, np.sqrt(variance), alike, np.bincount(place)[place])
+
+
+def largest_change(before: LogNoise, after: LogNoise) -> float:
+    """The largest share of a sigma, the odometry's or the sensor's, by which it changed."""
+    old, new = (np.array([*astuple(noise.odometry), *noise.scale]) for noise in (before, after))
+    return float((np.abs(new - old) / np.maximum(old, 1e-12)).max())
 
 
 def _redundancy(solved: Solved, seed: int) -> Array:

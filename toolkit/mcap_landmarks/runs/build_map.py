@@ -8,11 +8,19 @@ from pathlib import Path
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.errors import MapError, RecordingError
 from mcap_landmarks.manifest import Manifest, Outcome
-from mcap_landmarks.mapping.observations import LogObservations, Trajectory
+from mcap_landmarks.mapping.built_map import BuiltMap
+from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.maps.database import read_map, write_map
-from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.runs.map_plan import LogPlan, MapPlan, MapTask, plan_map
-from mcap_landmarks.runs.map_results import LOGS, MappedLog, MapRun, earlier_run, why_anew, write_log, write_part
+from mcap_landmarks.runs.map_results import (
+    MappedLog,
+    MapRun,
+    build_outcome,
+    earlier_run,
+    why_anew,
+    write_log,
+    write_part,
+)
 from mcap_landmarks.runs.pipeline import check_output, told
 from mcap_landmarks.runs.session import Session, StageRun, open_session, parts_folder
 from mcap_landmarks.runs.stage_input import StageInput
@@ -45,15 +53,16 @@ def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
     seen = [_observe(plan, log, reason, parts, watch) for log in plan.logs]
     logs = [mapped for mapped, _ in seen]
     with watch("solve", None, "steps"):
-        landmark_map, trajectories = _solve(plan, logs, [observations for _, observations in seen])
+        landmark_map, trajectories, termination = _solve(plan, logs, [observations for _, observations in seen])
     for log, trajectory in zip(plan.logs, trajectories, strict=True):
         if log.request.recording in plan.task.outputs:
             write_part(plan, log, landmark_map, trajectory, parts)
-    outcomes = {LOGS: [[*(run.outcome.entry() for run in log.stages), log.outcome.entry()] for log in logs]}
+    build = StageRun(STAGE.name, "ran", reason, build_outcome(plan, termination))
+    run = MapRun(landmark_map, build, tuple(logs), termination)
     fingerprints = tuple(log.fingerprint for log in logs)
-    manifest = Manifest("map", inputs=fingerprints, options=outcomes, stages=(plan.record,))
+    manifest = Manifest("map", inputs=fingerprints, options=run.options(), stages=(plan.record,))
     write_map(plan.task.database, landmark_map, manifest.entries())
-    return MapRun(landmark_map, StageRun(STAGE.name, "ran", reason, Outcome()), tuple(logs))
+    return run
 
 
 def _observe(plan: MapPlan, log: LogPlan, reason: str, parts: Path, watch: Watch) -> tuple[MappedLog, LogObservations]:
@@ -84,20 +93,18 @@ def _collect(plan: MapPlan, log: LogPlan, session: Session, watch: Watch) -> tup
     return replace(observations, fingerprint=log.fingerprint), outcome_of(source.reading)
 
 
-def _solve(
-    plan: MapPlan, logs: Sequence[MappedLog], observations: Sequence[LogObservations]
-) -> tuple[LandmarkMap, Sequence[Trajectory]]:
-    """The map, and where each log was in it.
+def _solve(plan: MapPlan, logs: Sequence[MappedLog], observations: Sequence[LogObservations]) -> BuiltMap:
+    """The map, where each log was in it, and how the solver ended.
 
     Raises:
-        MapError: what was seen is not enough.
+        MapError: what was seen is not enough, or the solver did not converge.
     """
     prior = read_map(plan.task.prior) if plan.task.prior is not None else None
     try:
-        landmark_map, trajectories = STAGE.solve(observations, prior, plan.config)
+        built: BuiltMap = STAGE.solve(observations, prior, plan.config)
     except MapError as error:
         raise MapError(f"{_named(logs)}: {error}{_found_by(logs)}") from error
-    return landmark_map, trajectories
+    return built
 
 
 def _named(logs: Sequence[MappedLog]) -> str:

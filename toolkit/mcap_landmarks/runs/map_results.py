@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from mcap_landmarks.channels import MAP_MARKERS, MAP_PATH, MAP_POSE
+from mcap_landmarks.estimation.termination import Termination
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, Manifest, Outcome, stage_records
-from mcap_landmarks.mapping.observations import Trajectory
+from mcap_landmarks.mapping.built_map import Trajectory
 from mcap_landmarks.maps.database import read_manifest, read_map
 from mcap_landmarks.maps.map_markers import markers_from_map
 from mcap_landmarks.maps.model import LandmarkMap, Source
@@ -21,8 +22,10 @@ from mcap_landmarks.runs.pipeline import told
 from mcap_landmarks.runs.session import StageRun, open_session, part_file
 from mcap_landmarks.stage import Stamped, Watch
 
-LOGS = "logs"
+_LOGS = "logs"
 """The manifest's option with what came of each log: of the stages before, then of the map."""
+_SOLVER = "solver"
+"""The manifest's option with how the solver ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,16 +40,22 @@ class MappedLog:
 
 @dataclass(frozen=True, slots=True)
 class MapRun:
-    """The map, what became of it, and what became of each log."""
+    """The map, what became of it and of each log, and how the solver ended; None where the method solves nothing."""
 
     landmark_map: LandmarkMap
     build: StageRun
     logs: tuple[MappedLog, ...]
+    termination: Termination | None
 
     @property
     def sources(self) -> tuple[Source, ...]:
         """What the map says of the logs, in their order."""
         return self.landmark_map.sources[len(self.landmark_map.sources) - len(self.logs) :]
+
+    def options(self) -> dict[str, object]:
+        """What the manifest keeps of the run, so that `earlier_run` finds it again."""
+        logs = [[*(run.outcome.entry() for run in log.stages), log.outcome.entry()] for log in self.logs]
+        return {_LOGS: logs, _SOLVER: asdict(self.termination) if self.termination else None}
 
 
 def earlier_run(plan: MapPlan, parts: Path) -> MapRun | None:
@@ -61,13 +70,22 @@ def earlier_run(plan: MapPlan, parts: Path) -> MapRun | None:
                 if session.find(plan.share(log)) is None:
                     return None
     reason = "the map was made from the same logs, files and settings"
-    logs = []
-    for log, (*before, own) in zip(plan.logs, json.loads(entries["options"])[LOGS], strict=True):
+    logs, options = [], json.loads(entries["options"])
+    for log, (*before, own) in zip(plan.logs, options[_LOGS], strict=True):
         outcomes = zip(log.steps, before, strict=True)
         stages = tuple(StageRun(step.stage.name, "reused", reason, Outcome.of(outcome)) for step, outcome in outcomes)
         logs.append(MappedLog(log.request.recording, log.fingerprint, stages, Outcome.of(own)))
-    build = StageRun(plan.record.stage, "reused", reason, Outcome())
-    return MapRun(read_map(plan.task.database), build, tuple(logs))
+    termination = Termination(**options[_SOLVER]) if options[_SOLVER] else None
+    build = StageRun(plan.record.stage, "reused", reason, build_outcome(plan, termination))
+    return MapRun(read_map(plan.task.database), build, tuple(logs), termination)
+
+
+def build_outcome(plan: MapPlan, termination: Termination | None) -> Outcome:
+    """What is to be said of a map beside its landmarks: whether its solver got near its limit."""
+    if termination is None or termination.iterations != plan.record.config["max_iterations"]:
+        return Outcome()
+    limit = f"a solution needed the last of {termination.iterations} iterations"
+    return Outcome(notes=(f"{limit}; set a larger build_map.max_iterations",))
 
 
 def why_anew(plan: MapPlan) -> str:

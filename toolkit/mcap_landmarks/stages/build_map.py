@@ -6,9 +6,10 @@ import numpy as np
 
 from mcap_landmarks.channels import MAP_MARKERS, MAP_PATH, MAP_POSE, ODOMETRY, SCENE_OBJECTS
 from mcap_landmarks.errors import MapError
+from mcap_landmarks.mapping.built_map import BuiltMap
 from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.landmark_slam import solve_jointly
-from mcap_landmarks.mapping.observations import LogObservations, Trajectory
+from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.mapping.thesis import solve_as_in_the_thesis
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.maps.scene_objects import known_covariances
@@ -44,13 +45,11 @@ def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservation
     )
 
 
-def solve(
-    logs: Sequence[LogObservations], prior: LandmarkMap | None, config: BuildMapConfig
-) -> tuple[LandmarkMap, list[Trajectory]]:
-    """One map of all logs, and each log's trajectory in it.
+def solve(logs: Sequence[LogObservations], prior: LandmarkMap | None, config: BuildMapConfig) -> BuiltMap:
+    """One map of all logs, each log's trajectory in it, and how the solver ended.
 
     Raises:
-        MapError: nothing was seen, or a log cannot be joined to the others.
+        MapError: nothing was seen, a log cannot be joined to the others, or the solver did not converge.
     """
     if not any(len(log.bundle) for log in logs):
         raise MapError("no bundle holds an object; a map needs scene objects")

@@ -1,0 +1,28 @@
+"""What a map builder hands back: the map, where each robot drove, and how the solver ended."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.estimation.termination import Termination
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.maps.model import LandmarkMap
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Where a log's robot was: stamps and log times (T,), map_from_base (T, 3)."""
+
+    stamps_ns: NDArray[np.int64]
+    log_times_ns: NDArray[np.int64]
+    map_from_base: Array
+
+
+class BuiltMap(NamedTuple):
+    """A map, one trajectory in it per log, and how the solver ended; None where the method has none."""
+
+    landmark_map: LandmarkMap
+    trajectories: list[Trajectory]
+    termination: Termination | None
