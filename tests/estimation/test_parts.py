@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mcap_landmarks.estimation import closed_form, robust
+from mcap_landmarks.estimation import procrustes, robust
 from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, motion_covariance
 from mcap_landmarks.estimation.polar import points_from_polar, polar_from_points
 from mcap_landmarks.estimation.symmetric import Symmetric3, Vector3, factor3, inverse2, inverse3, solve3
@@ -92,9 +92,9 @@ def test_student_loss_bends_as_its_weight_and_curvature_say() -> None:
     np.testing.assert_allclose(robust.student_curvature(far, bent, 3.0) * far, 0.9 * bent)
 
 
-def test_closed_form_without_weights_stays_finite() -> None:
+def test_procrustes_without_weights_stays_finite() -> None:
     zero = np.zeros((3, 1))
-    x, y, cosine, sine = closed_form.fit(zero, zero, zero, zero, zero)
+    x, y, cosine, sine = procrustes.fit(zero, zero, zero, zero, zero)
     assert [x[0], y[0], cosine[0], sine[0]] == [0, 0, 1, 0]
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, motion_covariance
 from mcap_landmarks.geometry import se2
-from mcap_landmarks.mapping.log_graph import LogSightings
+from mcap_landmarks.mapping.log_graph import LandmarkObservations
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 class Drive:
     """A log as the graph takes it, and the truth: poses (N, 3) and all landmarks (L, 2) in the world."""
 
-    log: LogSightings
+    log: LandmarkObservations
     poses: Array
     landmarks_xy: Array
 
@@ -54,7 +54,7 @@ def drive(
     range_m = distance[pose, landmark] + rng.normal(0, sigma_range_m, len(pose))
     bearing_rad = bearing[pose, landmark] + rng.normal(0, sigma_bearing_rad, len(pose))
     covariance = np.tile(np.diag([sigma_range_m**2, sigma_bearing_rad**2]), (len(pose), 1, 1))
-    log = LogSightings(np.zeros(3), motions, pose, landmark, range_m, bearing_rad, covariance)
+    log = LandmarkObservations(np.zeros(3), motions, pose, landmark, range_m, bearing_rad, covariance)
     return Drive(log, poses, landmarks_xy)
 
 

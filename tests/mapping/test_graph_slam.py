@@ -9,8 +9,8 @@ from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, dead_reck
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.mapping.common_frame import align
 from mcap_landmarks.mapping.config import BuildMapConfig
+from mcap_landmarks.mapping.confirmation import confirmed
 from mcap_landmarks.mapping.graph_slam import KnownLandmarks, MapSolution, solve_map
-from mcap_landmarks.mapping.support import confirmed
 
 from tests.estimation.worlds import Array
 from tests.mapping.drives import Drive, drive, landmarks_beside, with_wrong_landmarks
@@ -131,7 +131,7 @@ def test_errors_that_repeat_from_one_place_are_not_counted_as_news() -> None:
 @pytest.mark.parametrize("logs", [0, 1])
 def test_nothing_seen_is_an_error(logs: int) -> None:
     empty = loop(0).log.first(1)
-    with pytest.raises(MapError, match="without a single landmark"):
+    with pytest.raises(MapError, match="without a single observation of a landmark"):
         solve_map([replace(empty, pose=empty.pose[:0], landmark=empty.landmark[:0])] * logs, CONFIG)
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcap_landmarks.estimation.batch import PoseSolutions, solve_batch
 from mcap_landmarks.estimation.linearise import Observations, Poses
+from mcap_landmarks.estimation.pose_batch import PoseSolutions, solve_batch
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -36,24 +36,25 @@ def solve_bearings(
         x, y, bearing = (np.where(used, a, 0.0) for a in (x, y, bearing))
         weight = np.where(used, 1 / np.where(used, spread, 1.0), 0.0)
         zero = np.zeros_like(x)
-        seen = Observations(x, y, zero, np.cos(bearing), np.sin(bearing), zero, zero, weight)
-        return seen, _linear(seen, used), used
+        observed = Observations(x, y, zero, np.cos(bearing), np.sin(bearing), zero, zero, weight)
+        return observed, _linear(observed, used), used
 
     return solve_batch(prepare, *bearings.shape, numbers=1, robust_dof=None, max_iterations=max_iterations)
 
 
-def _linear(seen: Observations, used: Bools) -> Poses:
-    """Poses whose lines of sight pass landmarks closest, by a weighted algebraic distance.
+def _linear(observed: Observations, used: Bools) -> Poses:
+    """Poses whose lines of sight pass landmarks closest, by an algebraic distance (direct linear transform).
 
     With the position in the base frame as unknown, every bearing is linear in cosine, sine and position; they are the
-    eigenvector of least eigenvalue (direct linear transform). Landmarks are centred and scaled first.
+    eigenvector of least eigenvalue. Landmarks are centred and scaled first (Hartley 1997).
     """
     count = np.maximum(used.sum(axis=0), 1)
-    middle_x, middle_y = (seen.landmark_x * used).sum(axis=0) / count, (seen.landmark_y * used).sum(axis=0) / count
-    x, y = (seen.landmark_x - middle_x) * used, (seen.landmark_y - middle_y) * used
+    middle_x = (observed.landmark_x * used).sum(axis=0) / count
+    middle_y = (observed.landmark_y * used).sum(axis=0) / count
+    x, y = (observed.landmark_x - middle_x) * used, (observed.landmark_y - middle_y) * used
     size = np.sqrt((x * x + y * y).sum(axis=0) / count)
     size = np.where(size > 0, size, 1.0)
-    x, y, ux, uy = x / size, y / size, seen.direction_x * used, seen.direction_y * used
+    x, y, ux, uy = x / size, y / size, observed.direction_x * used, observed.direction_y * used
     rows = np.stack([ux * y - uy * x, -ux * x - uy * y, uy, -ux], axis=-1)
     _, vectors = np.linalg.eigh(np.einsum("kbi,kbj->bij", rows, rows))
     c, s, tx, ty = vectors[:, :, 0].T

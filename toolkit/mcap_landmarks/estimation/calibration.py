@@ -12,16 +12,21 @@ from mcap_landmarks.geometry.angles import wrap
 
 Array = NDArray[np.float64]
 
-# What is believed before: offsets of decimetres are odd; ranges may be distances or depths.
+# What is believed before, as sigmas: offsets of decimetres are odd, ranges may as well be depths as distances.
 _PRIOR_SIGMA = np.array([0.05, 1.0])
-# Both parameters together must explain that much chi-square, else none is applied.
+# Both parameters together must explain so much chi-square, else none is applied: noise does once in three million logs.
 _WORTH_IT = 30.0
+# Residuals beyond so many sigmas count as that (winsorised): of normal noise that takes half a percent of the variance.
 _OUTLIER = 3.0
+# The sigmas that are given count as so many residuals, so that a log of a few bundles stays near them.
 _GIVEN = 10.0
 # Rounds shrink the change by a factor of three to six; on MRCLAM it is below 1e-6 after so many.
 _ROUNDS = 15
 _CONVERGED = 1e-4
+# So many bundles, evenly chosen, give the offset to 1 to 6 mm and the depth to half a percent, within a second.
 _MOST_BUNDLES = 4000
+# Degrees of freedom that bear a tenth of wrong observations, as in `localize`.
+_ROBUST_DOF = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +73,12 @@ def calibrate(
     landmark_covariance: Array | None = None,
     mask: NDArray[np.bool_] | None = None,
 ) -> Calibration:
-    """Sensor model that makes B bundles of up to K sightings fit the map best; arguments as in `pose.solve_poses`.
+    """Sensor model that makes B bundles of up to K observations fit the map best; arguments as in `pose.solve_poses`.
 
     No truth is needed: a bundle of two landmarks has one number more than its pose, one of three has three. Poses are
     eliminated from each bundle (variable projection, Golub and Pereyra 1973); sigmas come from what redundancy is left
-    (Foerstner 1979). Sensors without a bearing to speak of, or too little data, give the plain model.
+    (variance component estimation: Helmert 1907, Foerstner 1979). Sensors without a bearing
+    to speak of, or too little data, give the plain model.
     """
     exists = np.ones(range_m.shape, dtype=np.bool_) if mask is None else mask
     rows = np.flatnonzero(exists.sum(axis=1) >= 2)
@@ -126,7 +132,6 @@ class _Bundles:
         new = at + np.linalg.solve(information + stiff, right - stiff @ at)
         left = np.clip(1 - (basis**2).sum(axis=2), 0, 1).reshape(*self.mask.shape, 2)[self.mask].sum(axis=0)
         squares = (np.clip(plain, -_OUTLIER, _OUTLIER) ** 2).reshape(*self.mask.shape, 2)[self.mask].sum(axis=0)
-        # The given sigmas count as a few residuals, so that small logs stay near them.
         scale = np.sqrt((squares * model.scale**2 + _GIVEN) / (left + _GIVEN))
         cost = float((residual**2).sum())
         return SensorModel(float(new[0]), float(new[1]), scale), float(new @ information @ new), cost
@@ -144,7 +149,7 @@ class _Bundles:
             noise,
             landmark_covariance=self.landmark_covariance,
             mask=self.mask,
-            robust_dof=3.0,
+            robust_dof=_ROBUST_DOF,
         )
         d = self.landmarks_xy - solved.map_from_base[:, None, :2]
         reach = np.maximum(np.hypot(d[..., 0], d[..., 1]), 1e-6)

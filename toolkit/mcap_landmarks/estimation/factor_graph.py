@@ -1,4 +1,4 @@
-"""The sparse least-squares problem of poses and landmarks, and its minimum under a robust loss."""
+"""The factor graph of poses and landmarks (Dellaert and Kaess 2017), and its minimum under a robust loss."""
 
 from dataclasses import dataclass
 
@@ -18,10 +18,12 @@ Ints = NDArray[np.int64]
 MAX_ITERATIONS = 50
 """Maps of the demo and of MRCLAM take 1 to 24."""
 TOLERANCE = 1e-6
-"""The relative fall of the cost that ends a search, as in Ceres Solver."""
-# Shares of the normal equations' diagonal: almost none at first, since starts are good; at most so much that no step
-# is left; and at least what keeps a landmark's column that hardly any weight is left of from being singular.
+"""The relative fall of the cost that ends a search; the default of Ceres Solver."""
+# Shares of the normal equations' diagonal: almost none at first, since starts are good; no more than what leaves a
+# millionth of a step; no less than what outweighs rounding, so that the factorisation finds no pivot of zero.
 _FIRST_DAMPING, _MOST_DAMPING, _LEAST_DAMPING = 1e-6, 1e6, 1e-12
+# A pose on top of a landmark has no bearing to it; this keeps the numbers finite there.
+_LEAST_DISTANCE_M = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,14 +47,15 @@ class Graph:
 
     M observations: pose and landmark index (M,), range and bearing (M,), root (M, 2, 2). E motions from pose
     `motion_pose` (E,) to the next: relative (E, 3), root (E, 3, 3). Q landmarks known beforehand: index (Q,), xy
-    (Q, 2), root (Q, 2, 2); without any, the first pose is held, else the frame would be free.
+    (Q, 2), root (Q, 2, 2); without any, the first pose is held, else shifting and turning everything would cost nothing
+    (gauge freedom).
     """
 
-    seen_pose: Ints
-    seen_landmark: Ints
+    observation_pose: Ints
+    observation_landmark: Ints
     range_m: Array
     bearing_rad: Array
-    seen_root: Array
+    observation_root: Array
     motion_pose: Ints
     motion: Array
     motion_root: Array
@@ -62,24 +65,24 @@ class Graph:
 
     def residuals(self, at: State) -> tuple[Array, Array, Array]:
         """Whitened residuals of observations (M, 2), motions (E, 3) and known landmarks (Q, 2)."""
-        _, distance, predicted = self._sight(at)
-        seen = np.stack([self.range_m - distance, wrap(self.bearing_rad - predicted)], axis=-1)
+        _, distance, predicted = self._line_of_sight(at)
+        observed = np.stack([self.range_m - distance, wrap(self.bearing_rad - predicted)], axis=-1)
         moved = self.motion - se2.between(at.poses[self.motion_pose], at.poses[self.motion_pose + 1])
         moved[:, 2] = wrap(moved[:, 2])
         known = self.prior_xy - at.landmarks_xy[self.prior_landmark]
-        pairs = ((self.seen_root, seen), (self.motion_root, moved), (self.prior_root, known))
+        pairs = ((self.observation_root, observed), (self.motion_root, moved), (self.prior_root, known))
         a, b, c = ((root @ residual[..., None])[..., 0] for root, residual in pairs)
         return a, b, c
 
     def jacobian(self, at: State, weight: Array) -> sp.csc_array:
         """Derivatives of the whitened predictions, rows as in `residuals`, observations times sqrt(weight)."""
-        d, distance, _ = self._sight(at)
+        d, distance, _ = self._line_of_sight(at)
         zero, one = np.zeros_like(distance), np.ones_like(distance)
         by_pose = _rows(
             [-d[:, 0] / distance, -d[:, 1] / distance, zero], [d[:, 1] / distance**2, -d[:, 0] / distance**2, -one]
         )
-        root = self.seen_root * np.sqrt(weight)[:, None, None]
-        pose, landmark = 3 * self.seen_pose, at.poses.size + 2 * self.seen_landmark
+        root = self.observation_root * np.sqrt(weight)[:, None, None]
+        pose, landmark = 3 * self.observation_pose, at.poses.size + 2 * self.observation_landmark
         first = np.concatenate([root @ by_pose, -root @ by_pose[:, :, :2]], axis=2)
         first_columns = np.stack([pose, pose + 1, pose + 2, landmark, landmark + 1], axis=1)
         start = 3 * self.motion_pose
@@ -92,11 +95,11 @@ class Graph:
         )
         return _sparse(blocks, at.poses.size + at.landmarks_xy.size)
 
-    def _sight(self, at: State) -> tuple[Array, Array, Array]:
+    def _line_of_sight(self, at: State) -> tuple[Array, Array, Array]:
         """From pose to landmark: difference (M, 2), distance (M,), bearing (M,)."""
-        pose = at.poses[self.seen_pose]
-        d = at.landmarks_xy[self.seen_landmark] - pose[:, :2]
-        return d, np.maximum(np.hypot(d[:, 0], d[:, 1]), 1e-6), np.arctan2(d[:, 1], d[:, 0]) - pose[:, 2]
+        pose = at.poses[self.observation_pose]
+        d = at.landmarks_xy[self.observation_landmark] - pose[:, :2]
+        return d, np.maximum(np.hypot(d[:, 0], d[:, 1]), _LEAST_DISTANCE_M), np.arctan2(d[:, 1], d[:, 0]) - pose[:, 2]
 
     def _motion_derivatives(self, at: State) -> Array:
         """Derivatives (E, 3, 6) of the relative motions by the earlier and the later pose."""
@@ -128,7 +131,10 @@ class Solved:
 def minimise(
     graph: Graph, start: State, robust_dof: float, max_iterations: int = MAX_ITERATIONS, tolerance: float = TOLERANCE
 ) -> Solved:
-    """Levenberg-Marquardt with Student-t weights on the observations: a Cauchy kernel of squared width `robust_dof`.
+    """Levenberg-Marquardt (Marquardt 1963) with Student-t weights on the observations, renewed at every step.
+
+    That is an M-estimate with a Cauchy kernel of squared width `robust_dof`, by iteratively reweighted Gauss-Newton:
+    the steps don't know how the kernel bends (no correction of Triggs et al. 2000), so they never overshoot for it.
 
     It ends with the iteration that lowers the cost by no more than `tolerance` of it. That alone could be a step that
     damping made short, so it has converged only if one more whole Gauss-Newton step promises no more either (the

@@ -51,20 +51,20 @@ class Linearised(NamedTuple):
     chi2: Array
 
 
-def linearise(seen: Observations, poses: Poses, robust_dof: float | None, *, newton: bool = True) -> Linearised:
+def linearise(observed: Observations, poses: Poses, robust_dof: float | None, *, newton: bool = True) -> Linearised:
     """Gauss-Newton's equations at `poses`, with Student-t weights of `robust_dof` degrees unless None.
 
     With `newton` the information is the one for steps, which knows how the robust loss bends; else the weighted one.
     """
-    dx, dy = seen.landmark_x - poses.x, seen.landmark_y - poses.y
+    dx, dy = observed.landmark_x - poses.x, observed.landmark_y - poses.y
     # A pose on top of a landmark has no bearing to it: keep the numbers finite there.
     square = np.maximum(dx * dx + dy * dy, 1e-12)
     distance = np.sqrt(square)
-    dx_east = poses.cosine * seen.direction_x - poses.sine * seen.direction_y
-    dy_north = poses.sine * seen.direction_x + poses.cosine * seen.direction_y
-    e_range = seen.range_m - distance
+    dx_east = poses.cosine * observed.direction_x - poses.sine * observed.direction_y
+    dy_north = poses.sine * observed.direction_x + poses.cosine * observed.direction_y
+    e_range = observed.range_m - distance
     e_bearing = np.arctan2(dx * dy_north - dy * dx_east, dx * dx_east + dy * dy_north)
-    w_rr, w_rb, w_bb = seen.weight_rr, seen.weight_rb, seen.weight_bb
+    w_rr, w_rb, w_bb = observed.weight_rr, observed.weight_rb, observed.weight_bb
     f_range = w_rr * e_range + w_rb * e_bearing
     f_bearing = w_rb * e_range + w_bb * e_bearing
     chi2 = e_range * f_range + e_bearing * f_bearing

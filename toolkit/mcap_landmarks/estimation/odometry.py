@@ -19,7 +19,7 @@ _SIDEWAYS = 0.25
 class OdometryNoise:
     """Random walk of odometry: standard deviations after one metre of way or one radian of turning.
 
-    The defaults suit a small wheeled robot of unknown quality; `graph.solve_map` estimates the log's own from there.
+    The defaults suit a small wheeled robot of unknown quality; mapping estimates the log's own from there.
     """
 
     position_per_metre_m: float = 0.05

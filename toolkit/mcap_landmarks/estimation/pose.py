@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcap_landmarks.estimation.batch import PoseSolutions, solve_batch
+from mcap_landmarks.estimation.pose_batch import PoseSolutions, solve_batch
 from mcap_landmarks.estimation.problems import Problems
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcap_landmarks.estimation import closed_form
+from mcap_landmarks.estimation import procrustes
 from mcap_landmarks.estimation.linearise import Observations, Poses
 from mcap_landmarks.estimation.symmetric import inverse2
 
@@ -65,7 +65,7 @@ class Problems(NamedTuple):
             lx, ly, range_m, bearing = (np.where(used, a, 0.0) for a in (lx, ly, range_m, bearing))
             variance = np.where(used, variance, 1.0)
         ux, uy = np.cos(bearing), np.sin(bearing)
-        start = Poses(*closed_form.fit(lx, ly, range_m * ux, range_m * uy, used / variance))
+        start = Poses(*procrustes.fit(lx, ly, range_m * ux, range_m * uy, used / variance))
         if spread is not None:
             noise = _add_map(noise, spread, start, ux, uy, range_m)
         if not used.all():

@@ -1,4 +1,4 @@
-"""Weights that keep wrong observations from pulling an estimate, and what they do to its covariance."""
+"""M-estimation with Student-t weights, which keep wrong observations from pulling, and what it does to covariances."""
 
 from functools import lru_cache
 
@@ -7,11 +7,16 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# The share of an observation's weight that the correction may take: all of it would leave no step along the residual.
+_MOST_BENT = 0.9
+# Nodes of Gauss-Laguerre quadrature: sixty give the factor to nine digits for three degrees of freedom.
+_NODES = 60
+
 
 def student_weight(chi2: Array, dof: float) -> Array:
     """Weights in (0, 1] of observations with squared Mahalanobis distance `chi2` under a Student-t of `dof` degrees.
 
-    Lange, Little and Taylor 1989, scaled to 1 at distance zero.
+    Lange, Little and Taylor 1989, scaled to 1 at distance zero: those of a Cauchy kernel of squared width `dof`.
     """
     return dof / (dof + chi2)
 
@@ -24,10 +29,10 @@ def student_loss(chi2: Array, dof: float) -> Array:
 def student_curvature(chi2: Array, weight: Array, dof: float) -> Array:
     """What Newton's matrix lacks against the weighted one, per outer product of an observation's weighted residual.
 
-    The loss bends less along the residual than across it, and beyond sqrt(dof) backwards; Triggs et al. 2000, section
-    4.3, limited so that a tenth of the weight remains and the matrix stays positive.
+    The loss bends less along the residual than across it, and beyond sqrt(dof) backwards: the correction of Triggs et
+    al. 2000, section 4.3, limited so that a tenth of the weight remains and the matrix stays positive.
     """
-    return weight * np.minimum(2 * weight / dof, 0.9 / np.maximum(chi2, 1e-300))
+    return weight * np.minimum(2 * weight / dof, _MOST_BENT / np.maximum(chi2, 1e-300))
 
 
 @lru_cache
@@ -38,7 +43,7 @@ def student_covariance_factor(dof: float, leverage: float) -> float:
     E[w + w' m]^2 (Huber and Ronchetti 2009, chapter 8) times E[w] as the fit sees it: its residuals are shorter than
     the noise by the share of the data that the parameters took, `leverage`. By Gauss-Laguerre quadrature over m / 2.
     """
-    half_chi2, probability = np.polynomial.laguerre.laggauss(60)
+    half_chi2, probability = np.polynomial.laguerre.laggauss(_NODES)
     weight = student_weight(2 * half_chi2, dof)
     spread = probability @ (weight * weight * half_chi2)
     slope = probability @ (weight * weight)  # w + w' m = w^2 for these weights

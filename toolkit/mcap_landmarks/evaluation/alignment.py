@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.estimation import closed_form
+from mcap_landmarks.estimation import procrustes
 from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array, rotation, transform_points
 
@@ -20,7 +20,7 @@ def fit(src_xy: Array, dst_xy: Array) -> Array:
     if not len(src_xy):
         return np.zeros(3)
     to_x, to_y, from_x, from_y = dst_xy[:, :1], dst_xy[:, 1:], src_xy[:, :1], src_xy[:, 1:]
-    x, y, cosine, sine = closed_form.fit(to_x, to_y, from_x, from_y, np.ones((len(src_xy), 1)))
+    x, y, cosine, sine = procrustes.fit(to_x, to_y, from_x, from_y, np.ones((len(src_xy), 1)))
     return np.array([x[0], y[0], np.arctan2(sine[0], cosine[0])])
 
 

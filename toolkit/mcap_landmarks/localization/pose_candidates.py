@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from mcap_landmarks.estimation import closed_form
+from mcap_landmarks.estimation import procrustes
 from mcap_landmarks.localization.index import MapIndex, side_lengths
 from mcap_landmarks.localization.verification import UNMATCHED, Candidates, Constellations
 
@@ -167,7 +167,7 @@ class PoseCandidates:
         """Poses of the hits by closed-form least squares (Procrustes; Umeyama 1991), of those alike the best."""
         of, objects = queries.of[query], queries.objects[query]
         points, places = sets.points_xy[of[:, None], objects], self.index.positions_xy[landmarks]
-        x, y, cosine, sine = closed_form.fit(
+        x, y, cosine, sine = procrustes.fit(
             places[..., 0].T, places[..., 1].T, points[..., 0].T, points[..., 1].T, np.ones(objects.T.shape)
         )
         pose = np.stack([x, y, np.arctan2(sine, cosine)], axis=-1)

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mcap_landmarks.estimation.batch import PoseSolutions
 from mcap_landmarks.estimation.bearings import solve_bearings
 from mcap_landmarks.estimation.pose import position_sigma
+from mcap_landmarks.estimation.pose_batch import PoseSolutions
 from mcap_landmarks.estimation.ranges import PositionSolutions, solve_ranges
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.localization.config import LocalizeConfig

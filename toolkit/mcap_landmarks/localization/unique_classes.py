@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.estimation.batch import PoseSolutions
 from mcap_landmarks.estimation.calibration import SensorModel, calibrate
 from mcap_landmarks.estimation.pose import solve_poses
+from mcap_landmarks.estimation.pose_batch import PoseSolutions
 from mcap_landmarks.geometry.se2 import Array, transform_points
 from mcap_landmarks.localization.class_association import unique_classes
 from mcap_landmarks.localization.config import LocalizeConfig

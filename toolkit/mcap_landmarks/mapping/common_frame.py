@@ -4,19 +4,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import MapError
-from mcap_landmarks.estimation import closed_form
+from mcap_landmarks.estimation import procrustes
 from mcap_landmarks.geometry import se2
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+# Pairs that are tried: if just half of the points fit, a quarter of the pairs do, so some of 500 drawn ones always.
 _PAIRS = 500
+# Points within so many times the median distance fit: 99.8 % of those whose errors are normal (Rayleigh distribution).
+_FITTING = 3.0
 
 
 def align(points_xy: Array, onto_xy: Array, seed: int = 0) -> Array:
     """Transform (3,) that brings points (N, 2) onto others (N, 2), N >= 2, right as long as more than half of them fit.
 
-    The pair of points whose transform has the least median distance (Rousseeuw 1984), then all within three times that.
+    Least median of squares (Rousseeuw 1984): of transforms by two points each, the one with the least median distance;
+    then the best one (Procrustes; Umeyama 1991) of all points within three times that.
     """
     first, second = np.triu_indices(len(points_xy), 1)
     if len(first) > _PAIRS:
@@ -29,11 +33,13 @@ def align(points_xy: Array, onto_xy: Array, seed: int = 0) -> Array:
     # With the two that made the transform left in, the median must look beyond them.
     middle = np.sort(distance, axis=1)[:, min(len(points_xy) // 2 + 1, len(points_xy) - 1)]
     best = int(np.argmin(middle))
-    near = distance[best] <= max(3 * middle[best], 1e-9)
+    near = distance[best] <= max(_FITTING * middle[best], 1e-9)
     return np.asarray(_fit(points_xy[near][:, None], onto_xy[near][:, None])[0])
 
 
-def join(alone: list[tuple[Ints, Array]], known: tuple[Ints, Array] | None) -> tuple[list[Array], Ints, Array]:
+def into_one_frame(
+    alone: list[tuple[Ints, Array]], known: tuple[Ints, Array] | None
+) -> tuple[list[Array], Ints, Array]:
     """Transforms (3,) of each log's landmarks (numbers (L,), positions (L, 2)) into one frame, and all of them in it.
 
     That frame is the one of the landmarks `known` beforehand, else the first log's. Next comes always the log that
@@ -53,7 +59,7 @@ def join(alone: list[tuple[Ints, Array]], known: tuple[Ints, Array] | None) -> t
         best = max(waiting, key=lambda i: len(shared[i]))
         if len(shared[best]) < 2:
             raise MapError(
-                f"log {best + 1} shares {len(shared[best])} landmarks with the others, but joining takes two; "
+                f"log {best + 1} shares {len(shared[best])} landmarks with the others, but one frame takes two; "
                 "map it on its own or add a log that overlaps with both"
             )
         place = dict(zip(alone[best][0].tolist(), alone[best][1], strict=True))
@@ -69,5 +75,5 @@ def join(alone: list[tuple[Ints, Array]], known: tuple[Ints, Array] | None) -> t
 def _fit(points_xy: Array, onto_xy: Array) -> Array:
     """Transforms (B, 3) that bring points (K, B, 2) onto others (K, B, 2)."""
     weight = np.ones(points_xy.shape[:2])
-    x, y, c, s = closed_form.fit(onto_xy[..., 0], onto_xy[..., 1], points_xy[..., 0], points_xy[..., 1], weight)
+    x, y, c, s = procrustes.fit(onto_xy[..., 0], onto_xy[..., 1], points_xy[..., 0], points_xy[..., 1], weight)
     return np.stack([x, y, np.arctan2(s, c)], axis=-1)

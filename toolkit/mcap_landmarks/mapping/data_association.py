@@ -4,7 +4,7 @@ An EKF over the robot's pose and every landmark (Dissanayake et al. 2001) keeps 
 towards what was just seen, wide towards what was left long ago. Only labels are taken from it; the graph does the rest.
 
 Its errors are right-invariant (Barrau and Bonnabel 2015; for SLAM Zhang et al. 2017): those of a rotation of everything
-about the origin, then of shifts of robot and landmarks. Jacobians of what is seen then hold no estimate, so the filter
+about the origin, then of shifts of robot and landmarks. Jacobians of observations then hold no estimate, so the filter
 cannot take its own changes of mind for knowledge of the heading, which makes the common EKF far too sure (Huang et al.
 2010): at a place seen again after a long loop it would not recognise anything.
 """
@@ -21,17 +21,24 @@ from mcap_landmarks.geometry import se2
 from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array, between, compose, rotation, transform_points
 
-_FAR = 1e9
-# Log density of an object that was not foreseen: somewhere on the 100 m by 100 m around the robot.
-_ANYWHERE = -math.log(100.0 * 100.0)
 UNLABELLED = -1
+# Stands for infinity among distances, which the assignment cannot take.
+_FAR = 1e9
+# A pair beyond the gate costs as much as ten at it, so that one more pair within it is worth more than closer ones.
+_BEYOND_GATE = 10
+# Pairs of one bundle fit together unless right ones would do so worse in one of a thousand bundles, as the gate has it.
+_JOINT_P = 0.001
+# Log density of an object that was not foreseen: it may be anywhere on the 100 m by 100 m around the robot, and sensors
+# reach no further. Every assumption pays it for each landmark once, so its size hardly matters.
+_ANYWHERE = -math.log(100.0 * 100.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Gates:
     """Squared Mahalanobis distances (2 degrees of freedom): below `same` it may be the landmark, above `new` it is not.
 
-    Between the two an observation is evidence for neither and stays unlabelled.
+    Between the two an observation is evidence for neither and stays unlabelled. The right landmark is beyond `same`
+    once in 1,000 observations; beyond `new` once in 10,000 even if the covariances are half of what they should be.
     """
 
     same: float = float(chdtri(2, 0.001))
@@ -48,7 +55,7 @@ class LandmarkFilter:
     def __init__(self, start: Array, gates: Gates) -> None:
         self.mean: Array = np.array(start, dtype=np.float64)
         self.covariance: Array = np.zeros((3, 3))
-        self.kinds: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self.class_ids: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
         self.log_evidence = 0.0
         self._gates = gates
 
@@ -68,15 +75,15 @@ class LandmarkFilter:
         moved[3::2], moved[4::2] = -self.mean[4::2], self.mean[3::2]
         return moved
 
-    def see(self, kinds: NDArray[np.int64], points_xy: Array, covariances: Array) -> NDArray[np.int64]:
+    def observe(self, class_ids: NDArray[np.int64], points_xy: Array, covariances: Array) -> NDArray[np.int64]:
         """Label (K,) each object of one bundle with a landmark's number, new ones included; learn from it.
 
-        kinds (K,) are numbers of classes, points_xy (K, 2) and covariances (K, 2, 2) are in the base frame.
+        class_ids (K,) are numbers of classes, points_xy (K, 2) and covariances (K, 2, 2) are in the base frame.
         """
-        labels = np.full(len(kinds), UNLABELLED, dtype=np.int64)
-        distances = np.full((len(kinds), len(self.kinds)), _FAR)
-        for i, (kind, point, covariance) in enumerate(zip(kinds, points_xy, covariances, strict=True)):
-            candidates = np.flatnonzero(self.kinds == kind)
+        labels = np.full(len(class_ids), UNLABELLED, dtype=np.int64)
+        distances = np.full((len(class_ids), len(self.class_ids)), _FAR)
+        for i, (class_id, point, covariance) in enumerate(zip(class_ids, points_xy, covariances, strict=True)):
+            candidates = np.flatnonzero(self.class_ids == class_id)
             if len(candidates):
                 distances[i, candidates] = self._distances(candidates, point, covariance)
         rows, columns = self._assign(distances)
@@ -84,10 +91,10 @@ class LandmarkFilter:
         labels[rows] = columns
         if len(rows):
             self._update(columns, points_xy[rows], covariances[rows])
-        self.log_evidence += _ANYWHERE * (len(kinds) - len(rows))
+        self.log_evidence += _ANYWHERE * (len(class_ids) - len(rows))
         fresh = (labels == UNLABELLED) & (distances.min(axis=1, initial=_FAR) > self._gates.new)
         for row in np.flatnonzero(fresh):
-            labels[row] = self._insert(int(kinds[row]), points_xy[row], covariances[row])
+            labels[row] = self._insert(int(class_ids[row]), points_xy[row], covariances[row])
         return labels
 
     def _distances(self, candidates: NDArray[np.int64], point: Array, covariance: Array) -> Array:
@@ -103,22 +110,28 @@ class LandmarkFilter:
         return squared
 
     def _assign(self, distances: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """One landmark per object and one object per landmark, as many as the gate lets, with the least total."""
+        """One landmark per object and one object per landmark, as many as the gate lets, with the least total.
+
+        Global nearest neighbour: the assignment problem of Kuhn (1955) and Munkres (1957).
+        """
         if not distances.size:
             return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-        rows, columns = linear_sum_assignment(np.minimum(distances, 10 * self._gates.same))
+        rows, columns = linear_sum_assignment(np.minimum(distances, _BEYOND_GATE * self._gates.same))
         keep = distances[rows, columns] <= self._gates.same
         return rows[keep], columns[keep]
 
     def _jointly(
         self, rows: NDArray[np.int64], columns: NDArray[np.int64], points_xy: Array, covariances: Array
     ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """The pairs that fit together (joint compatibility, Neira and Tardos 2001); the worst leaves until all do."""
+        """The pairs that fit together (joint compatibility, Neira and Tardos 2001).
+
+        Until all do, the one leaves that spoils the fit most: iterated data snooping (Baarda 1968).
+        """
         while len(rows) > 1:
             miss, jacobian, noise = self._stack(columns, points_xy[rows], covariances[rows])
             spread = jacobian @ self.covariance @ jacobian.T + noise
             solved = np.linalg.solve(spread, miss)
-            if miss @ solved <= chdtri(len(miss), 0.001):
+            if miss @ solved <= chdtri(len(miss), _JOINT_P):
                 break
             worst = int(np.argmax(_saved_by_leaving_out(solved, np.linalg.inv(spread))))
             rows, columns = np.delete(rows, worst), np.delete(columns, worst)
@@ -157,7 +170,7 @@ class LandmarkFilter:
         landmarks = self.mean[3:].reshape(-1, 2) @ turned.T + error[3:].reshape(-1, 2) @ along.T
         self.mean[3:] = landmarks.ravel()
 
-    def _insert(self, kind: int, point: Array, covariance: Array) -> int:
+    def _insert(self, class_id: int, point: Array, covariance: Array) -> int:
         n, turn = len(self.mean), rotation(self.mean[2])
         grown = np.zeros((n + 2, n + 2))
         grown[:n, :n] = self.covariance
@@ -165,12 +178,15 @@ class LandmarkFilter:
         grown[n:, n:] = self.covariance[:2, :2] + turn @ covariance @ turn.T
         self.mean = np.concatenate([self.mean, transform_points(self.mean[:3], point)])
         self.covariance = grown
-        self.kinds = np.append(self.kinds, kind)
-        return len(self.kinds) - 1
+        self.class_ids = np.append(self.class_ids, class_id)
+        return len(self.class_ids) - 1
 
 
 def _saved_by_leaving_out(solved: NDArray[np.floating], inverse: NDArray[np.floating]) -> Array:
-    """How much the squared distance falls (K,) if one of K pairs is left out: its part of S^-1 m, over that of S^-1."""
+    """How much the squared distance falls (K,) if one of K pairs is left out: its part of S^-1 m, over that of S^-1.
+
+    Baarda's (1968) test statistic, of two numbers at once.
+    """
     parts = solved.reshape(-1, 2)
     k = np.arange(len(parts))
     blocks = inverse.reshape(len(parts), 2, len(parts), 2)[k, :, k, :]
@@ -182,8 +198,8 @@ def _saved_by_leaving_out(solved: NDArray[np.floating], inverse: NDArray[np.floa
 class Labels:
     """Landmark number (N,) per observation, `UNLABELLED` where unclear; the filter's poses (T, 3).
 
-    `log_evidence` is the log density of all observations given the noise that was assumed: the higher, the better the
-    assumption.
+    `log_evidence` is the log density of all observations given the noise that was assumed, as the sum of those of their
+    innovations (prediction error decomposition, Schweppe 1965): the higher, the better the assumption.
     """
 
     landmark: NDArray[np.int64]
@@ -195,7 +211,7 @@ def label_observations(
     odom_from_base: Array,
     step_covariances: Array,
     bundle: NDArray[np.int64],
-    kinds: NDArray[np.int64],
+    class_ids: NDArray[np.int64],
     points_xy: Array,
     covariances: Array,
     gates: Gates = Gates(),
@@ -203,7 +219,7 @@ def label_observations(
     """Label each of N observations made along T bundles with a landmark's number.
 
     odom_from_base (T, 3) with covariances (T - 1, 3, 3) of the steps between, in the base frame of each step's start;
-    `bundle` (N,) rises and says in which of T each was seen; kinds (N,) are class numbers; points_xy (N, 2) and
+    `bundle` (N,) rises and says in which of T each was seen; class_ids (N,) are class numbers; points_xy (N, 2) and
     covariances (N, 2, 2) are in the base frame.
     """
     state = LandmarkFilter(odom_from_base[0], gates)
@@ -216,6 +232,6 @@ def label_observations(
             state.move(steps[t - 1], step_covariances[t - 1])
         rows = slice(bounds[t], bounds[t + 1])
         if bounds[t] < bounds[t + 1]:
-            labels[rows] = state.see(kinds[rows], points_xy[rows], covariances[rows])
+            labels[rows] = state.observe(class_ids[rows], points_xy[rows], covariances[rows])
         poses[t] = state.mean[:3]
     return Labels(labels, poses, state.log_evidence)

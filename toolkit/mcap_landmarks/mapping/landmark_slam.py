@@ -1,4 +1,4 @@
-"""The default way to build a map: label what was seen, join the logs, solve poses and landmarks together."""
+"""The default way to build a map: a submap of each log, all merged, then poses and landmarks solved together."""
 
 from collections.abc import Sequence
 
@@ -10,46 +10,48 @@ from mcap_landmarks.estimation.polar import polar_from_points
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.mapping.built_map import BuiltMap, Trajectory
 from mcap_landmarks.mapping.config import BuildMapConfig
+from mcap_landmarks.mapping.confirmation import confirmed
 from mcap_landmarks.mapping.data_association import UNLABELLED
 from mcap_landmarks.mapping.graph_slam import KnownLandmarks, MapSolution, solve_map
 from mcap_landmarks.mapping.groups import groups_of
-from mcap_landmarks.mapping.labelling import label_log, motions_of
-from mcap_landmarks.mapping.log_graph import LogSightings
-from mcap_landmarks.mapping.merge_logs import Numbering, number_landmarks
+from mcap_landmarks.mapping.log_graph import LandmarkObservations
+from mcap_landmarks.mapping.merge_logs import MergedLandmarks, merge_logs
 from mcap_landmarks.mapping.observations import LogObservations
-from mcap_landmarks.mapping.support import confirmed
+from mcap_landmarks.mapping.submap import build_submap, motions_of
 from mcap_landmarks.maps.model import LandmarkMap, Source
 
 Ints = NDArray[np.int64]
 
-# Below this weight the joint solution took a sighting for wrong.
+# Below this weight the joint solution took an observation for wrong: with one degree of freedom, 3 sigmas or more.
 _WRONG = 0.1
+# Variance in m^2 that keeps rounding from making a covariance negative: a hundredth of a millimetre.
+_ROUNDING_M2 = 1e-10
 
 
 def solve_jointly(logs: Sequence[LogObservations], prior: LandmarkMap | None, config: BuildMapConfig) -> BuiltMap:
     """One map of all logs, on top of `prior` where there is one, and each log's trajectory in it.
 
     Raises:
-        MapError: a log has nothing to map or cannot be joined to the others, or the solver did not converge.
+        MapError: a log has nothing to map or cannot be merged with the others, or the solver did not converge.
     """
     empty = [str(i + 1) for i, log in enumerate(logs) if not len(log.bundle)]
     if empty:
         raise MapError(f"log {', '.join(empty)} holds no object in any bundle with odometry; leave it out")
     names = sorted({name for log in logs for name in log.classes} | set(prior.classes if prior else ()))
-    kind_of = {name: kind for kind, name in enumerate(names)}
-    kinds = [np.array([kind_of[name] for name in log.classes], dtype=np.int64) for log in logs]
-    local = [label_log(log, kind, config) for log, kind in zip(logs, kinds, strict=True)]
+    id_of_class = {name: i for i, name in enumerate(names)}
+    class_ids = [np.array([id_of_class[name] for name in log.classes], dtype=np.int64) for log in logs]
+    submaps = [build_submap(log, ids, config) for log, ids in zip(logs, class_ids, strict=True)]
     known = None
     if prior is not None:
-        known = np.array([kind_of[name] for name in prior.classes], dtype=np.int64), prior.positions_xy
-    numbering = number_landmarks(local, known, config)
+        known = np.array([id_of_class[name] for name in prior.classes], dtype=np.int64), prior.positions_xy
+    merged = merge_logs(submaps, known, config)
     numbers = [
-        np.where(part.landmark == UNLABELLED, UNLABELLED, of_log[part.landmark])
-        for part, of_log in zip(local, numbering.of_log, strict=True)
+        np.where(submap.landmark == UNLABELLED, UNLABELLED, of_log[submap.landmark])
+        for submap, of_log in zip(submaps, merged.of_log, strict=True)
     ]
-    sightings = [_sightings(log, number) for log, number in zip(logs, numbers, strict=True)]
-    solution = solve_map(sightings, config, _known(prior, config))
-    landmark_map = _map_of(logs, numbers, numbering, solution, names, prior, config)
+    labelled = [_labelled(log, number) for log, number in zip(logs, numbers, strict=True)]
+    solution = solve_map(labelled, config, _known(prior, config))
+    landmark_map = _map_of(logs, numbers, merged, solution, names, prior, config)
     trajectories = [
         Trajectory(log.stamps_ns, log.log_times_ns, poses)
         for log, poses in zip(logs, solution.trajectories, strict=True)
@@ -57,10 +59,10 @@ def solve_jointly(logs: Sequence[LogObservations], prior: LandmarkMap | None, co
     return BuiltMap(landmark_map, trajectories, solution.termination)
 
 
-def _sightings(log: LogObservations, number: Ints) -> LogSightings:
+def _labelled(log: LogObservations, number: Ints) -> LandmarkObservations:
     seen = np.flatnonzero(number != UNLABELLED)
     polar = polar_from_points(log.points_xy[seen], log.covariances[seen])
-    return LogSightings(log.odom_from_base[0], motions_of(log), log.bundle[seen], number[seen], *polar)
+    return LandmarkObservations(log.odom_from_base[0], motions_of(log), log.bundle[seen], number[seen], *polar)
 
 
 def _known(prior: LandmarkMap | None, config: BuildMapConfig) -> KnownLandmarks | None:
@@ -74,14 +76,14 @@ def _known(prior: LandmarkMap | None, config: BuildMapConfig) -> KnownLandmarks 
 def _map_of(
     logs: Sequence[LogObservations],
     numbers: Sequence[Ints],
-    numbering: Numbering,
+    merged: MergedLandmarks,
     solution: MapSolution,
     names: Sequence[str],
     prior: LandmarkMap | None,
     config: BuildMapConfig,
 ) -> LandmarkMap:
     """The solved landmarks with how often, how large and in which groups they were seen."""
-    radii, measured = np.zeros(len(numbering.kinds)), np.zeros(len(numbering.kinds), dtype=np.int64)
+    radii, measured = np.zeros(len(merged.class_ids)), np.zeros(len(merged.class_ids), dtype=np.int64)
     sources = list(prior.sources) if prior else []
     for log, number, weight in zip(logs, numbers, solution.weights, strict=True):
         seen = np.flatnonzero(number != UNLABELLED)
@@ -93,23 +95,23 @@ def _map_of(
     row = solution.number
     ids = [f"l{number + 1}" for number in row]
     radius = radii[row] / np.maximum(measured[row], 1)
-    sightings = solution.sightings.copy()
+    observations = solution.observations.copy()
     if prior is not None:
         ids = [*prior.ids, *(name for name in ids[len(prior) :])]
-        sightings[: len(prior)] += prior.sightings
+        observations[: len(prior)] += prior.sightings
         radius[: len(prior)] = np.where(measured[: len(prior)] > 0, radius[: len(prior)], prior.radii_m)
     covariances = _definite(solution.covariance)
-    sure = confirmed(solution.landmarks_xy, covariances, sightings, config)
+    sure = confirmed(solution.landmarks_xy, covariances, observations, config)
     if prior is not None:
         sure[: len(prior)] |= ~prior.tentative
     name_of = {int(number): ids[i] for i, number in enumerate(row) if sure[i]}
     return LandmarkMap(
         tuple(ids),
-        tuple(names[numbering.kinds[number]] for number in row),
+        tuple(names[merged.class_ids[number]] for number in row),
         solution.landmarks_xy,
         covariances,
         radius,
-        sightings,
+        observations,
         np.logical_not(sure),
         groups_of(logs, numbers, solution.trajectories, name_of),
         tuple(sources),
@@ -119,6 +121,5 @@ def _map_of(
 
 def _definite(covariances: Array) -> Array:
     """Covariances made symmetric and kept from rounding to something negative."""
-    floor = 1e-10 * np.eye(2)
-    symmetric: Array = (covariances + covariances.swapaxes(1, 2)) / 2 + floor
+    symmetric: Array = (covariances + covariances.swapaxes(1, 2)) / 2 + _ROUNDING_M2 * np.eye(2)
     return symmetric

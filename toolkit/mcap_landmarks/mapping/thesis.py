@@ -14,11 +14,11 @@ from mcap_landmarks.maps.model import Group, LandmarkMap, Source
 
 @dataclass(slots=True)
 class _Triangle:
-    """The latest sighting of a group."""
+    """The latest observation of a group, and how many there were."""
 
     points_xy: Array
     map_from_base: Array
-    sightings: int
+    observations: int
 
 
 def solve_as_in_the_thesis(logs: Sequence[LogObservations]) -> BuiltMap:
@@ -41,7 +41,7 @@ def solve_as_in_the_thesis(logs: Sequence[LogObservations]) -> BuiltMap:
             classes = tuple(log.classes[row] for row in rows)
             known = groups.get(classes)
             points = transform_points(pose, log.points_xy[rows])
-            groups[classes] = _Triangle(points, pose, known.sightings + 1 if known else 1)
+            groups[classes] = _Triangle(points, pose, known.observations + 1 if known else 1)
             used += 1
         sources.append(Source("recording", log.fingerprint, log.bundles, used))
         trajectories.append(Trajectory(log.stamps_ns, log.log_times_ns, log.odom_from_base))
@@ -59,7 +59,7 @@ def _map_of(groups: dict[tuple[str, ...], _Triangle], sources: tuple[Source, ...
         np.concatenate([triangle.points_xy for triangle in groups.values()]),
         np.zeros((n, 2, 2)),
         np.zeros(n),
-        np.repeat([triangle.sightings for triangle in groups.values()], 3),
+        np.repeat([triangle.observations for triangle in groups.values()], 3),
         np.zeros(n, dtype=np.bool_),
         tuple(Group(names, triangle.map_from_base) for names, triangle in zip(ids, groups.values(), strict=True)),
         sources,

@@ -1,4 +1,4 @@
-"""The pose that fits points to landmarks best, in closed form: weighted Procrustes in the plane."""
+"""The pose that fits points to landmarks best, in closed form: weighted orthogonal Procrustes in the plane."""
 
 import numpy as np
 from numpy.typing import NDArray
