@@ -57,8 +57,8 @@ def annotations_topic(log: InputLog, _config: object) -> str:
 
     That is the parent of the CameraInfo topic that shares most of the image's path, else of the image topic.
     """
-    image, kind = log.primary.topic, CameraInfo.ROS_TYPE
-    infos = [entry.connection.topic for entry in log.channels if entry.connection.message_type == kind]
+    image, wanted = log.primary.topic, CameraInfo.ROS_TYPE
+    infos = [entry.connection.topic for entry in log.channels if entry.connection.message_type == wanted]
     shared = {topic: shared_namespaces(image, topic) for topic in infos}
     base = image.removesuffix("/compressed")
     nearest = max(sorted(infos), key=shared.__getitem__, default=base)

@@ -24,7 +24,7 @@ class ChannelDiff:
     are names that each run gives as it likes: only one that does not stay with its partner's is a change.
     """
 
-    kind: str
+    message_type: str
     tolerance: Callable[[str], Tolerance]
     unit: str = MESSAGES
     rows: Tally = field(init=False)
@@ -73,7 +73,7 @@ class ChannelDiff:
         worst = [*self.rows.alone["removed"], *self.rows.alone["added"]]
         worst += [case for entry in fields.values() for case in entry.cases]
         return {
-            "type": self.kind,
+            "type": self.message_type,
             "unit": self.unit,
             **self.rows.counts(),
             "messages": self.messages.counts(),

@@ -87,8 +87,8 @@ class McapLog:
     def _carry(self, entry: ChannelSummary) -> Carried | None:
         carried = self._file.carry(entry.connection)
         if carried is None and entry.count:
-            kind = entry.connection.message_encoding or "unknown"
-            self.dropped[f"{entry.connection.topic}: {kind} messages, where ROS 2 needs CDR"] += entry.count
+            encoding = entry.connection.message_encoding or "unknown"
+            self.dropped[f"{entry.connection.topic}: {encoding} messages, where ROS 2 needs CDR"] += entry.count
         return carried
 
     def messages(

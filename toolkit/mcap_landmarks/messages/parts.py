@@ -39,10 +39,10 @@ def header_to_ros(stamp_ns: int, frame_id: str) -> RosObject:
     return make("std_msgs/Header", stamp=stamp_to_ros(stamp_ns), frame_id=frame_id)
 
 
-def point_to_ros(kind: str, values: ArrayLike) -> RosObject:
+def point_to_ros(ros_type: str, values: ArrayLike) -> RosObject:
     """Three numbers as `geometry_msgs/Point` or `geometry_msgs/Vector3`."""
     x, y, z = np.asarray(values, dtype=np.float64).tolist()
-    return make(kind, x=x, y=y, z=z)
+    return make(ros_type, x=x, y=y, z=z)
 
 
 def point_from_ros(point: RosObject) -> Array:

@@ -100,9 +100,9 @@ def _missing(recording: Readable, channel: Channel[Message], empty: bool) -> str
             f"{recording.path}: there is no {channel.topic}; run the stage that writes it first, or read another topic "
             f"as it with --remap TOPIC={channel.topic}"
         )
-    kinds = " or ".join(role.types)
+    types = " or ".join(role.types)
     remedy = f"choose a topic with {role.option}, or take a log that has one, such as {channel.topic}"
-    return f"{recording.path}: there is no {role.name} ({kinds}); {could_be(recording, channel) or remedy}"
+    return f"{recording.path}: there is no {role.name} ({types}); {could_be(recording, channel) or remedy}"
 
 
 def read_bundles(
