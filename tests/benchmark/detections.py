@@ -15,7 +15,7 @@ from mcap_landmarks.runs.plan import Request
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.detection import find, prepare, thresholds
 from mcap_landmarks.vision.detector import read_detector
-from mcap_landmarks.vision.session import open_session
+from mcap_landmarks.vision.onnx_session import open_session
 from mcap_landmarks_generator.assets.catalog import COCO_ID, HELD_OUT_SEEDS
 from mcap_landmarks_generator.camera import Intrinsics
 from mcap_landmarks_generator.checks import stage

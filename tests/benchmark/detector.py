@@ -18,8 +18,8 @@ from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.runs.pipeline import run_stages
 from mcap_landmarks.runs.plan import Request
 from mcap_landmarks.vision.letterbox import Colours, fit, tensor
+from mcap_landmarks.vision.onnx_session import open_session
 from mcap_landmarks.vision.pixels import rgb_from_message
-from mcap_landmarks.vision.session import open_session
 from numpy.typing import NDArray
 
 from tests.benchmark import detections

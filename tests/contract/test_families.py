@@ -10,8 +10,8 @@ import pytest
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.detector import Detector, read_detector
 from mcap_landmarks.vision.families import family_names, find_family
-from mcap_landmarks.vision.family import Layout, Signature
-from mcap_landmarks.vision.session import Tensor, open_session
+from mcap_landmarks.vision.family import ModelLayout, Signature
+from mcap_landmarks.vision.onnx_session import Tensor, open_session
 
 from tests.vision.networks import Export, yolov5
 
@@ -83,7 +83,7 @@ class TestModel:
         session, two = detector.session, len(CLASSES)
         found = Signature(session.path, session.inputs, session.outputs, two, session.metadata)
         layouts = {other: find_family(other).recognise(found) for other in family_names()}
-        assert [other for other, layout in layouts.items() if isinstance(layout, Layout)] == [name]
+        assert [other for other, layout in layouts.items() if isinstance(layout, ModelLayout)] == [name]
 
     def test_its_outputs_have_the_shapes_of_its_layout(
         self, name: str, make: Callable[[Path], Path], tmp_path: Path

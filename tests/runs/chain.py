@@ -13,7 +13,7 @@ from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.stage import Stamped
-from mcap_landmarks.vision.session import NO_CONSTANTS, Session
+from mcap_landmarks.vision.onnx_session import NO_CONSTANTS, OnnxSession
 
 from tests.vision.networks import answering
 
@@ -77,13 +77,13 @@ def two_posts(path: Path) -> Path:
 def counted(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """A list that grows by one with every run of a network."""
     looks: list[int] = []
-    run = Session.run
+    run = OnnxSession.run
 
     def counting(
-        self: Session, array: np.ndarray, constants: Mapping[str, np.ndarray] = NO_CONSTANTS
+        self: OnnxSession, array: np.ndarray, constants: Mapping[str, np.ndarray] = NO_CONSTANTS
     ) -> list[np.ndarray]:
         looks.append(1)
         return run(self, array, constants)
 
-    monkeypatch.setattr(Session, "run", counting)
+    monkeypatch.setattr(OnnxSession, "run", counting)
     return looks

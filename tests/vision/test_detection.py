@@ -8,7 +8,7 @@ from mcap_landmarks.config import stage_config
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.detection import input_size, thresholds
 from mcap_landmarks.vision.detector import read_detector
-from mcap_landmarks.vision.session import open_session
+from mcap_landmarks.vision.onnx_session import open_session
 
 from tests.vision.networks import Export, yolov5
 

@@ -7,7 +7,7 @@ import pytest
 from mcap_landmarks.errors import ModelError, UsageError
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.detector import Detector, read_detector
-from mcap_landmarks.vision.session import open_session
+from mcap_landmarks.vision.onnx_session import open_session
 
 from tests.vision.networks import Export, answering, yolov5
 

@@ -15,7 +15,7 @@ from mcap_landmarks.vision import families
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.detection import prepare
 from mcap_landmarks.vision.detector import Detector, read_detector
-from mcap_landmarks.vision.session import open_session
+from mcap_landmarks.vision.onnx_session import open_session
 
 from tests.vision.networks import answering
 
@@ -23,12 +23,12 @@ TOY = '''
 """Boxes with their score and class, as shares of an image that is stretched; NMS is done."""
 
 import numpy as np
-from mcap_landmarks.vision.family import Candidates, Family, Layout
+from mcap_landmarks.vision.family import BoxCandidates, Family, ModelLayout
 from mcap_landmarks.vision.letterbox import Colours, Letterbox
-from mcap_landmarks.vision.session import fits
+from mcap_landmarks.vision.onnx_session import fits
 
 
-class Ended(Layout):
+class Ended(ModelLayout):
     def outputs(self, input_px):
         return ((1, None, 6),)
 
@@ -36,7 +36,7 @@ class Ended(Layout):
         rows = outputs[0][0].astype(np.float32)
         classes = rows[:, 5].astype(np.intp)
         rows, classes = (part[rows[:, 4] > thresholds[classes]] for part in (rows, classes))
-        return Candidates(rows[:, :4] * np.array(input_px[::-1] * 2, np.float32), rows[:, 4], classes)
+        return BoxCandidates(rows[:, :4] * np.array(input_px[::-1] * 2, np.float32), rows[:, 4], classes)
 
 
 def recognise(signature):

@@ -10,7 +10,7 @@ onnx = pytest.importorskip("onnx")
 import onnxruntime  # noqa: E402 - after what may skip
 from mcap_landmarks.vision.config import DetectConfig  # noqa: E402
 from mcap_landmarks.vision.detector import read_detector  # noqa: E402
-from mcap_landmarks.vision.session import open_session  # noqa: E402
+from mcap_landmarks.vision.onnx_session import open_session  # noqa: E402
 from mcap_landmarks_generator.training import fitting  # noqa: E402
 from mcap_landmarks_generator.training.coco import NAMES  # noqa: E402
 from mcap_landmarks_generator.training.examples import CLASS_IDS, Batch, Phase  # noqa: E402

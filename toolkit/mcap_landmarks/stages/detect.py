@@ -19,10 +19,10 @@ from mcap_landmarks.vision.classifier import Classifier, open_classifier
 from mcap_landmarks.vision.config import THESIS_SIZE_PX, DetectConfig
 from mcap_landmarks.vision.detection import Found, Prepared, find, prepare, thresholds
 from mcap_landmarks.vision.detector import Detector, read_detector
+from mcap_landmarks.vision.onnx_session import open_session
 from mcap_landmarks.vision.pixels import rgb_from_message
 from mcap_landmarks.vision.prefetch import in_order
 from mcap_landmarks.vision.review import Verdict, review
-from mcap_landmarks.vision.session import open_session
 
 
 def process(

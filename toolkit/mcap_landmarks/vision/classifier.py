@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from mcap_landmarks.errors import ModelError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.vision.metadata import names_of
+from mcap_landmarks.vision.onnx_session import FLOATS, OnnxSession, Provider, fits, open_session
 from mcap_landmarks.vision.pixels import Rgb
-from mcap_landmarks.vision.session import FLOATS, Provider, Session, fits, open_session
 
 _USUAL_SIDE_PX = 224
 _WIDER, _MARGIN_PX = 1.3, 30.0
@@ -20,7 +20,7 @@ _WIDER, _MARGIN_PX = 1.3, 30.0
 class Classifier:
     """A classifier: class names, input (height, width), and the mean and spread that it takes colours by."""
 
-    session: Session
+    session: OnnxSession
     names: tuple[str, ...]
     input_px: tuple[int, int]
     mean: tuple[float, float, float]

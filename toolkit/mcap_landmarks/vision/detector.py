@@ -11,9 +11,9 @@ from mcap_landmarks.errors import ModelError, UsageError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.families import family_names, find_family
-from mcap_landmarks.vision.family import Candidates, Family, Layout, Signature
+from mcap_landmarks.vision.family import BoxCandidates, Family, ModelLayout, Signature
 from mcap_landmarks.vision.metadata import confidence_of, names_of
-from mcap_landmarks.vision.session import FLOATS, Session, fits, written
+from mcap_landmarks.vision.onnx_session import FLOATS, OnnxSession, fits, written
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,9 +23,9 @@ class Detector:
     `confidence` holds the model's own thresholds by class name, empty where its metadata have none.
     """
 
-    session: Session
+    session: OnnxSession
     family: Family
-    layout: Layout
+    layout: ModelLayout
     names: tuple[str, ...]
     confidence: Mapping[str, float]
 
@@ -49,7 +49,7 @@ class Detector:
 
     def candidates(
         self, outputs: list[NDArray[Any]], input_px: tuple[int, int], thresholds: NDArray[np.float32]
-    ) -> Candidates:
+    ) -> BoxCandidates:
         """The boxes in the outputs for an input (height, width), above the threshold of their class (classes,).
 
         Raises:
@@ -67,7 +67,7 @@ class Detector:
         return self.layout.decode(used, input_px, thresholds)
 
 
-def read_detector(session: Session, names_file: Location | None, config: DetectConfig) -> Detector:
+def read_detector(session: OnnxSession, names_file: Location | None, config: DetectConfig) -> Detector:
     """The detector that an ONNX file is, with the class names of its metadata if there is no file of them.
 
     Raises:
@@ -88,11 +88,11 @@ def _asked_for(name: str | None) -> tuple[str, ...]:
     return known if name is None else (name,)
 
 
-def _recognised(signature: Signature, names: tuple[str, ...]) -> tuple[Family, Layout]:
+def _recognised(signature: Signature, names: tuple[str, ...]) -> tuple[Family, ModelLayout]:
     found, expected = [], []
     for family in map(find_family, names):
         layout = family.recognise(signature)
-        if isinstance(layout, Layout):
+        if isinstance(layout, ModelLayout):
             found.append((family, layout))
         else:
             expected.append(f"{layout} ({family.title})")

@@ -11,20 +11,20 @@ from numpy.typing import NDArray
 from mcap_landmarks.locations import Location
 from mcap_landmarks.vision.letterbox import Boxes, Colours, Letterbox, fit
 from mcap_landmarks.vision.metadata import literal
-from mcap_landmarks.vision.session import Shape, Tensor
+from mcap_landmarks.vision.onnx_session import Shape, Tensor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Candidates:
+class BoxCandidates:
     """N boxes in pixels of the input: boxes_xyxy (N, 4), scores (N,), class_ids (N,)."""
 
     boxes_xyxy: Boxes
     scores: NDArray[np.float32]
     class_ids: NDArray[np.intp]
 
-    def take(self, indices: NDArray[Any]) -> "Candidates":
+    def take(self, indices: NDArray[Any]) -> "BoxCandidates":
         """Some of the boxes."""
-        return Candidates(self.boxes_xyxy[indices], self.scores[indices], self.class_ids[indices])
+        return BoxCandidates(self.boxes_xyxy[indices], self.scores[indices], self.class_ids[indices])
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Signature:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Layout(ABC):
+class ModelLayout(ABC):
     """The inputs and outputs of one model of a family.
 
     `input_px` is (height, width), None where free; a free side is chosen in whole `stride_px`. The image is the first
@@ -70,7 +70,7 @@ class Layout(ABC):
     @abstractmethod
     def decode(
         self, outputs: Sequence[NDArray[Any]], input_px: tuple[int, int], thresholds: NDArray[np.float32]
-    ) -> Candidates:
+    ) -> BoxCandidates:
         """The boxes whose score is above the threshold of their class (classes,), of outputs of the said shapes.
 
         Boxes and scores that are not finite are left out.
@@ -89,7 +89,7 @@ class Family:
 
     name: str
     title: str
-    recognise: Callable[[Signature], Layout | str]
+    recognise: Callable[[Signature], ModelLayout | str]
     needs_nms: bool
     colours: Colours = field(default_factory=Colours)
     place: Callable[[tuple[int, int], tuple[int, int]], Letterbox] = fit

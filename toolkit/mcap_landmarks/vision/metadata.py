@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from mcap_landmarks.errors import ModelError
 from mcap_landmarks.locations import Location, to_read
-from mcap_landmarks.vision.session import Session
+from mcap_landmarks.vision.onnx_session import OnnxSession
 
 
 def literal(path: Location, metadata: Mapping[str, str], key: str) -> object:
@@ -23,32 +23,39 @@ def literal(path: Location, metadata: Mapping[str, str], key: str) -> object:
         raise ModelError(f"{path}: {key} in the metadata is {text[:60]!r}; export the model again") from error
 
 
-def names_of(session: Session, names_file: Location | None) -> tuple[str, ...]:
+def names_of(session: OnnxSession, names_file: Location | None) -> tuple[str, ...]:
     """The class names by class id: lines of a file, else the metadata's `names`.
 
     Raises:
         ModelError: there are none.
     """
-    if names_file is not None:
-        try:
-            lines = to_read(names_file).read_text().split("\n")
-        except (OSError, UnicodeDecodeError) as error:
-            raise ModelError(f"{names_file}: not a text file of class names, one per line: {error}") from error
-        names = tuple(line.strip() for line in lines if line.strip())
-    else:
-        found = literal(session.path, session.metadata, "names")
-        found = () if found is None else found
-        if isinstance(found, Mapping):
-            found = [found.get(i) for i in range(len(found))]
-        names = tuple(name for name in found if isinstance(name, str)) if isinstance(found, Sequence) else ()
-        if not isinstance(found, Sequence) or len(names) != len(found):
-            raise ModelError(f"{session.path}: the names in its metadata cannot be read; give --names FILE")
+    names = _own_names(session) if names_file is None else _names_in(names_file)
     if not names:
         raise ModelError(f"{session.path}: it has no class names in its metadata; give --names FILE, one name per line")
     return names
 
 
-def confidence_of(session: Session, names: tuple[str, ...]) -> dict[str, float]:
+def _names_in(file: Location) -> tuple[str, ...]:
+    try:
+        lines = to_read(file).read_text().split("\n")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(f"{file}: not a text file of class names, one per line: {error}") from error
+    return tuple(line.strip() for line in lines if line.strip())
+
+
+def _own_names(session: OnnxSession) -> tuple[str, ...]:
+    found = literal(session.path, session.metadata, "names")
+    if found is None:
+        return ()
+    if isinstance(found, Mapping):
+        found = [found.get(i) for i in range(len(found))]
+    names = tuple(name for name in found if isinstance(name, str)) if isinstance(found, Sequence) else ()
+    if not isinstance(found, Sequence) or len(names) != len(found):
+        raise ModelError(f"{session.path}: the names in its metadata cannot be read; give --names FILE")
+    return names
+
+
+def confidence_of(session: OnnxSession, names: tuple[str, ...]) -> dict[str, float]:
     """The metadata's `confidence`, one number or a number by class name, as thresholds by class name; empty if none.
 
     Raises:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import ModelError
-from mcap_landmarks.vision.family import Candidates, Family, Layout, Signature
-from mcap_landmarks.vision.session import FLOATS, Shape, Tensor, fits, written
+from mcap_landmarks.vision.family import BoxCandidates, Family, ModelLayout, Signature
+from mcap_landmarks.vision.onnx_session import FLOATS, Shape, Tensor, fits, written
 
 Anchors = NDArray[np.float32]
 """Widths and heights of the anchor boxes (heads, 3, 2) in pixels of the input."""
@@ -34,7 +34,7 @@ _COARSEST_STRIDES_PX = (32, 64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AnchorLayout(Layout):
+class AnchorLayout(ModelLayout):
     """The outputs of one model; `anchors` matter only where they are raw."""
 
     classes: int
@@ -42,13 +42,13 @@ class AnchorLayout(Layout):
     anchors: Anchors
 
     def outputs(self, input_px: tuple[int, int]) -> tuple[Shape, ...]:
-        """See `Layout`."""
+        """See `ModelLayout`."""
         return output_shapes(self.form, input_px, self.stride_px, self.classes)
 
     def decode(
         self, outputs: Sequence[NDArray[Any]], input_px: tuple[int, int], thresholds: NDArray[np.float32]
-    ) -> Candidates:
-        """See `Layout`; a score is objectness times probability. In the order of the network's cells."""
+    ) -> BoxCandidates:
+        """See `ModelLayout`; a score is objectness times probability. In the order of the network's cells."""
         del input_px
         lowest = float(thresholds.min())
         if self.form == "decoded":
@@ -92,16 +92,22 @@ def output_shapes(
 ) -> tuple[Shape, ...]:
     """The shapes of the outputs of a model with so many classes; None where a free input leaves them free."""
     height, width = input_px
-    grids = [
-        (None if height is None else height // stride, None if width is None else width // stride)
-        for stride in strides(stride_px)
-    ]
+    if form == "decoded":
+        boxes = None if height is None or width is None else _boxes(height, width, stride_px)
+        return ((1, boxes, 5 + classes),)
+    grids = [(_cells(height, stride), _cells(width, stride)) for stride in strides(stride_px)]
     if form == "heads":
-        return tuple((1, 3, h, w, 5 + classes) for h, w in grids)
-    if form == "planes":
-        return tuple((1, 3 * (5 + classes), h, w) for h, w in grids)
-    cells = None if height is None or width is None else sum(3 * (h or 0) * (w or 0) for h, w in grids)
-    return ((1, cells, 5 + classes),)
+        return tuple((1, 3, rows, columns, 5 + classes) for rows, columns in grids)
+    return tuple((1, 3 * (5 + classes), rows, columns) for rows, columns in grids)
+
+
+def _cells(side_px: int | None, stride_px: int) -> int | None:
+    return None if side_px is None else side_px // stride_px
+
+
+def _boxes(height_px: int, width_px: int, stride_px: int) -> int:
+    """How many boxes all heads give: three in each cell."""
+    return sum(3 * (height_px // stride) * (width_px // stride) for stride in strides(stride_px))
 
 
 def split_planes(raw: NDArray[Any], columns: int) -> NDArray[Any]:
@@ -119,7 +125,7 @@ def head_rows(raw: NDArray[Any], stride_px: int, anchors: Anchors, lowest: float
     return rows
 
 
-def scored(rows: NDArray[np.float32], thresholds: NDArray[np.float32]) -> Candidates:
+def scored(rows: NDArray[np.float32], thresholds: NDArray[np.float32]) -> BoxCandidates:
     """Candidates of rows (N, 5 + classes): centre, size, objectness, class probabilities."""
     class_ids = rows[:, 5:].argmax(axis=1)
     with np.errstate(invalid="ignore", over="ignore"):  # a broken network's numbers are sorted out below
@@ -127,7 +133,7 @@ def scored(rows: NDArray[np.float32], thresholds: NDArray[np.float32]) -> Candid
     good = (scores > thresholds[class_ids]) & np.isfinite(rows[:, :4]).all(axis=1) & np.isfinite(scores)
     centres, halves = rows[good, 0:2], rows[good, 2:4] / 2
     boxes = np.concatenate([centres - halves, centres + halves], axis=1)
-    return Candidates(boxes, scores[good], class_ids[good])
+    return BoxCandidates(boxes, scores[good], class_ids[good])
 
 
 def _sigmoid(values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -138,18 +144,24 @@ def _sigmoid(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def _form(signature: Signature, stride_px: int) -> Form | None:
     inputs, outputs = signature.inputs, signature.outputs
-    if len(inputs) != 1 or not fits(inputs[0].shape, (1, 3, None, None)) or inputs[0].dtype not in FLOATS:
+    if len(inputs) != 1 or not _takes_images(inputs[0], stride_px):
         return None
     height, width = inputs[0].shape[2:]
-    whole = all(side is None or side % stride_px == 0 for side in (height, width))
     forms: tuple[Form, ...] = ("decoded", "heads", "planes")
-    for form in forms if whole else ():
+    for form in forms:
         expected = output_shapes(form, (height, width), stride_px, signature.classes)
         # Old exports give the raw heads behind the decoded output, too.
         found = outputs[:1] if form == "decoded" and _is_old(outputs) else outputs
         if len(found) == len(expected) and all(map(fits, (entry.shape for entry in found), expected)):
             return form
     return None
+
+
+def _takes_images(entry: Tensor, stride_px: int) -> bool:
+    """Whether an input takes images in whole strides."""
+    if not fits(entry.shape, (1, 3, None, None)) or entry.dtype not in FLOATS:
+        return False
+    return all(side is None or side % stride_px == 0 for side in entry.shape[2:])
 
 
 def _is_old(outputs: Sequence[Tensor]) -> bool:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap_landmarks.errors import ModelError, UsageError
-from mcap_landmarks.vision.session import open_session
+from mcap_landmarks.vision.onnx_session import open_session
 
 from tests.vision.networks import answering
 

@@ -51,7 +51,7 @@ def fits(found: Sequence[int | None], expected: Shape) -> bool:
     return len(found) == len(expected) and all(a == b or a is None or b is None for a, b in pairs)
 
 
-class Session:
+class OnnxSession:
     """A loaded ONNX file; made by `open_session`. It may be run from several threads."""
 
     def __init__(self, path: Location, session: onnxruntime.InferenceSession) -> None:
@@ -76,7 +76,7 @@ class Session:
             ) from error
 
 
-def open_session(path: Location, provider: Provider = "cpu", threads: int = 0) -> Session:
+def open_session(path: Location, provider: Provider = "cpu", threads: int = 0) -> OnnxSession:
     """A session of an ONNX file, the same one for the same file and settings; `threads` 0: one per core.
 
     Raises:
@@ -92,7 +92,7 @@ def open_session(path: Location, provider: Provider = "cpu", threads: int = 0) -
 
 
 @lru_cache(maxsize=2)
-def _open(path: Path, _version: tuple[int, int], provider: Provider, threads: int) -> Session:
+def _open(path: Path, _version: tuple[int, int], provider: Provider, threads: int) -> OnnxSession:
     name = _PROVIDERS[provider]
     if name not in onnxruntime.get_available_providers():
         raise UsageError(f"detect.provider = {provider}: this onnxruntime has no {name}; install onnxruntime-gpu")
@@ -109,7 +109,7 @@ def _open(path: Path, _version: tuple[int, int], provider: Provider, threads: in
         raise ModelError(f"{path}: not an ONNX model that can be run: {_first_line(error)}") from error
     if session.get_providers()[0] != name:  # onnxruntime falls back to the CPU when a GPU library is missing
         raise UsageError(f"detect.provider = {provider}: {name} does not start; check the driver, CUDA and cuDNN")
-    return Session(path, session)
+    return OnnxSession(path, session)
 
 
 def _tensor(entry: onnxruntime.NodeArg) -> Tensor:
