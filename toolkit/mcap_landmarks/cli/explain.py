@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
 
@@ -12,6 +12,8 @@ from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks.evaluation.explain import Place, Situation
+    from mcap_landmarks.messages.detections import Detections
+    from mcap_landmarks.messages.match import LandmarkMatch
 
 
 def command(
@@ -135,7 +137,25 @@ def _print_objects(situation: "Situation", places: "tuple[Place, ...]") -> None:
     table(["object", "class", "range", "bearing", "sigma", "landmark of the best", "off by"], rows)
 
 
-def _objects(situation: "Situation", places: "tuple[Place, ...]") -> list[dict[str, Any]]:
+_ObjectEntry = TypedDict(
+    "_ObjectEntry",
+    {
+        "id": str,
+        "class": str,
+        "probability": float,
+        "x_m": float,
+        "y_m": float,
+        "range_m": float,
+        "bearing_deg": float,
+        "sigma_m": float | None,
+        "landmark": str | None,
+        "residual_m": float | None,
+        "sigmas": float | None,
+    },
+)
+
+
+def _objects(situation: "Situation", places: "tuple[Place, ...]") -> list[_ObjectEntry]:
     import numpy as np
 
     scene = situation.scene
@@ -147,7 +167,7 @@ def _objects(situation: "Situation", places: "tuple[Place, ...]") -> list[dict[s
             sigmas = [None] * len(place.rows) if place.sigmas is None else place.sigmas.tolist()
             off = zip(place.landmark_ids, place.residual_m.tolist(), sigmas, strict=True)
             paired = dict(zip(place.rows.tolist(), off, strict=True))
-    found = []
+    found: list[_ObjectEntry] = []
     for i, name in enumerate(scene.ids):
         x, y = scene.positions_xy[i].tolist()
         spread = float(np.sqrt(np.linalg.eigvalsh(scene.covariances[i])[-1])) if scene.covariances[i].any() else None
@@ -196,21 +216,13 @@ def _pose(place: "Place") -> tuple[float, float, float]:
     return x, y, float(np.degrees(heading))
 
 
-def _document(situation: "Situation", places: "tuple[Place, ...]") -> dict[str, Any]:
-    from mcap_landmarks.localization.decision import told
-
+def _document(situation: "Situation", places: "tuple[Place, ...]") -> dict[str, object]:
     match, found = situation.match, situation.detections
     return {
         "stamp_ns": situation.stamp_ns,
         "status": None if match is None else match.status.name.lower(),
         "bundles_joined": None if match is None else match.bundles_joined,
-        "detections": None
-        if found is None
-        else [
-            {"class": options_[0][0], "confidence": options_[0][1], "xyxy": box}
-            for options_, box in zip(found.hypotheses, found.boxes_xyxy.tolist(), strict=True)
-            if options_
-        ],
+        "detections": None if found is None else _detections(found),
         "clusters": None if situation.scan_objects is None else len(situation.scan_objects),
         "objects": None if situation.scene is None else _objects(situation, places),
         "places": [
@@ -224,13 +236,25 @@ def _document(situation: "Situation", places: "tuple[Place, ...]") -> dict[str, 
             }
             for place in places
         ],
-        "conditions": None
-        if match is None or not match.conditions
-        else [
-            {"name": one.name, "value": one.value, "limit": one.limit, "holds": one.held, "words": told(one)}
-            for one in match.conditions
-        ],
+        "conditions": None if match is None or not match.conditions else _conditions(match),
     }
+
+
+def _detections(found: "Detections") -> list[dict[str, object]]:
+    return [
+        {"class": hypotheses[0][0], "confidence": hypotheses[0][1], "xyxy": box}
+        for hypotheses, box in zip(found.hypotheses, found.boxes_xyxy.tolist(), strict=True)
+        if hypotheses
+    ]
+
+
+def _conditions(match: "LandmarkMatch") -> list[dict[str, object]]:
+    from mcap_landmarks.localization.decision import told
+
+    return [
+        {"name": one.name, "value": one.value, "limit": one.limit, "holds": one.held, "words": told(one)}
+        for one in match.conditions
+    ]
 
 
 _POSE = ("x_m", "y_m", "heading_deg")

@@ -1,11 +1,10 @@
 """The picture of an explanation: image with boxes, scan with clusters and objects, map around the candidates."""
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
 
 from mcap_landmarks.evaluation.explain import Place, Situation
 from mcap_landmarks.geometry.se2 import Array, transform_points
@@ -32,7 +31,7 @@ def explanation_figure(situation: Situation, places: tuple[Place, ...], view: Se
     return result
 
 
-def _draw_image(axes: Axes, situation: Situation, image: Any) -> None:  # noqa: ANN401 - pixels
+def _draw_image(axes: Axes, situation: Situation, image: NDArray[np.uint8]) -> None:
     axes.imshow(image)
     axes.set_axis_off()
     found = situation.detections

@@ -5,7 +5,6 @@ import dataclasses
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +30,9 @@ from mcap_landmarks.inspection.topic_roles import Choice, choose, message_type
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN
-from mcap_landmarks.messages.codec import Message, decode
+from mcap_landmarks.messages.codec import M, Message, decode
+from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.images import CompressedImage, Image
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.stage import Channel, Connection
@@ -52,6 +53,29 @@ class SensorData:
     scan_xy: Array | None = None
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Around:
+    """The messages around a moment, by channel and by the times that they are of."""
+
+    messages: dict[Channel[Message], dict[int, Message]]
+
+    def at(self, channel: Channel[M], time_ns: int) -> M | None:
+        """The message of a time."""
+        message = self.messages[channel].get(time_ns)
+        return message if isinstance(message, channel.message) else None
+
+    def nearest(self, channel: Channel[Message], time_ns: int) -> Message | None:
+        """The message nearest to a time, None if it is too far away."""
+        messages = self.messages[channel]
+        nearest_ns = min(messages, key=lambda other_ns: abs(other_ns - time_ns), default=None)
+        return None if nearest_ns is None or abs(nearest_ns - time_ns) > _BESIDE_NS else messages[nearest_ns]
+
+    def detections(self, time_ns: int) -> Detections | None:
+        """The detections nearest to a time."""
+        found = self.nearest(DETECTIONS, time_ns)
+        return found if isinstance(found, Detections) else None
+
+
 def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
     """The bundle of a log that is nearest in time, and what its sensors saw.
 
@@ -60,13 +84,13 @@ def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
     """
     with open_recording(path) as recording:
         channels = {c: channel for channel in (*_OF_BUNDLE, *_BESIDE) for c in _connections(recording, channel)}
-        found: dict[Channel[Any], dict[int, Message]] = {channel: {} for channel in (*_OF_BUNDLE, *_BESIDE)}
+        found = _Around({channel: {} for channel in (*_OF_BUNDLE, *_BESIDE)})
         for raw in recording.messages(channels, at_ns - _AROUND_NS, at_ns + _AROUND_NS):
             channel = channels[raw.connection]
             with contextlib.suppress(MessageError):
-                message: Any = decode(message_type(channel, raw.connection), raw.data, _schema(raw.connection))
-                found[channel][message.stamp_ns or raw.log_time_ns] = message
-        bundles = found[MATCH] or found[SCENE_OBJECTS]
+                message = decode(message_type(channel, raw.connection), raw.data, _schema(raw.connection))
+                found.messages[channel][getattr(message, "stamp_ns", 0) or raw.log_time_ns] = message
+        bundles = found.messages[MATCH] or found.messages[SCENE_OBJECTS]
         if not bundles:
             raise RecordingError(
                 f"{path}: no bundle with scene objects within 3 s of {at_ns}; the log goes from {recording.start_ns} "
@@ -76,17 +100,17 @@ def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
         return _situation(recording, found, stamp_ns), _view(recording, found, stamp_ns)
 
 
-def _situation(recording: Recording, found: dict[Channel[Any], dict[int, Any]], stamp_ns: int) -> Situation:
-    pose, spread = found[POSE].get(stamp_ns), found[POSE_COVARIANCE].get(stamp_ns)
+def _situation(recording: Recording, found: _Around, stamp_ns: int) -> Situation:
+    pose, spread = found.at(POSE, stamp_ns), found.at(POSE_COVARIANCE, stamp_ns)
     return Situation(
         stamp_ns,
-        found[SCENE_OBJECTS].get(stamp_ns),
-        found[MATCH].get(stamp_ns),
+        found.at(SCENE_OBJECTS, stamp_ns),
+        found.at(MATCH, stamp_ns),
         _once(recording, MAP),
         None if pose is None else pose.pose,
         None if spread is None else spread.planar_covariance,
-        found[SCAN_OBJECTS].get(stamp_ns),
-        _nearest(found[DETECTIONS], stamp_ns),
+        found.at(SCAN_OBJECTS, stamp_ns),
+        found.detections(stamp_ns),
         _config(recording),
     )
 
@@ -106,15 +130,14 @@ def _schema(connection: Connection) -> str:
     return connection.schema.decode(errors="replace")
 
 
-def _view(recording: Recording, found: dict[Channel[Any], dict[int, Any]], stamp_ns: int) -> SensorData:
-    detections = _nearest(found[DETECTIONS], stamp_ns)
-    image = _nearest(found[CAMERA_IMAGE], stamp_ns if detections is None else detections.stamp_ns)
+def _view(recording: Recording, found: _Around, stamp_ns: int) -> SensorData:
+    detections = found.detections(stamp_ns)
+    image = found.nearest(CAMERA_IMAGE, stamp_ns if detections is None else detections.stamp_ns)
     pixels = None
-    if image is not None:
+    if isinstance(image, CompressedImage | Image):
         with contextlib.suppress(MessageError):
             pixels = rgb_from_message(image)
-    scene = found[SCENE_OBJECTS].get(stamp_ns)
-    scan = found[SCAN].get(stamp_ns)
+    scene, scan = found.at(SCENE_OBJECTS, stamp_ns), found.at(SCAN, stamp_ns)
     if scan is None or scene is None:
         return SensorData(pixels)
     return SensorData(pixels, _points(recording, scan, scene.frame_id))
@@ -137,7 +160,7 @@ def _points(recording: Recording, scan: LaserScan, base: str) -> Array:
     return points[:, :2]
 
 
-def _connections(recording: Recording, channel: Channel[Any]) -> Iterable[Connection]:
+def _connections(recording: Recording, channel: Channel[Message]) -> Iterable[Connection]:
     """The connections that play a channel's part; none where several could, since one too many would mislead."""
     try:
         return choose(recording, channel, Choice())
@@ -145,12 +168,7 @@ def _connections(recording: Recording, channel: Channel[Any]) -> Iterable[Connec
         return ()
 
 
-def _once(recording: Recording, channel: Channel[Any]) -> Any:  # noqa: ANN401 - of the channel's type
+def _once(recording: Recording, channel: Channel[M]) -> M | None:
     connections = recording.connections(channel.topic)
     raw = next(recording.messages(connections), None) if connections else None
     return None if raw is None else decode(channel.message, raw.data)
-
-
-def _nearest(messages: dict[int, Any], stamp_ns: int) -> Any:  # noqa: ANN401 - of the channel's type
-    time_ns = min(messages, key=lambda time_ns: abs(time_ns - stamp_ns), default=None)
-    return None if time_ns is None or abs(time_ns - stamp_ns) > _BESIDE_NS else messages[time_ns]
