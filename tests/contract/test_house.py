@@ -30,12 +30,8 @@ FOLDERS_OF_VERBS = ("cli", "stages", "runs", "inspection", "evaluation")
 COMPLEX_STILL = (
     "fusion/inheritance.py inherit",
     "fusion/scene.py scene_of",
-    "mapping/common_frame.py into_one_frame",
-    "mapping/graph_slam.py _stack",
-    "mapping/landmark_slam.py solve_jointly",
-    "stages/build_map.py collect",
 )
-CLASS_NAMES_STILL = ("Candidates", "Solved", "Source", "Tracks", "Trajectory")
+CLASS_NAMES_STILL = ("Candidates", "Source", "Tracks")
 
 
 @cache

@@ -5,7 +5,7 @@ import pytest
 from mcap_landmarks.estimation import robust
 from mcap_landmarks.estimation.bearings import solve_bearings
 from mcap_landmarks.estimation.calibration import calibrate
-from mcap_landmarks.estimation.factor_graph import Graph, Solved, State, minimise
+from mcap_landmarks.estimation.factor_graph import Graph, GraphSolution, State, minimise
 from mcap_landmarks.estimation.pose import solve_poses
 from mcap_landmarks.estimation.ranges import solve_ranges
 from mcap_landmarks.estimation.termination import Termination
@@ -25,7 +25,7 @@ def graph_of_landmarks(range_m: Array, bearing_rad: Array, sigma: float = 0.1) -
     return Graph(zeros, zeros, range_m, bearing_rad, root, *none)
 
 
-def solved(range_m: list[float], start: tuple[float, float], max_iterations: int = 50) -> Solved:
+def solved(range_m: list[float], start: tuple[float, float], max_iterations: int = 50) -> GraphSolution:
     graph = graph_of_landmarks(np.array(range_m), np.zeros(len(range_m)))
     return minimise(graph, State(np.zeros((1, 3)), np.array([start])), 3.0, max_iterations)
 

@@ -115,7 +115,7 @@ class Graph:
 
 
 @dataclass(frozen=True, slots=True)
-class Solved:
+class GraphSolution:
     """The minimum, its robust weights (M,), whitened residuals and the factored normal equations of what is free."""
 
     graph: Graph
@@ -130,7 +130,7 @@ class Solved:
 
 def minimise(
     graph: Graph, start: State, robust_dof: float, max_iterations: int = MAX_ITERATIONS, tolerance: float = TOLERANCE
-) -> Solved:
+) -> GraphSolution:
     """Levenberg-Marquardt (Marquardt 1963) with Student-t weights on the observations, renewed at every step.
 
     That is an M-estimate with a Cauchy kernel of squared width `robust_dof`, by iteratively reweighted Gauss-Newton:
@@ -164,7 +164,7 @@ def minimise(
     factor, right = _factor(jacobian, _LEAST_DAMPING), _right(jacobian, residuals, weight)
     promised = float(right @ factor.solve(right))
     termination = Termination(promised <= tolerance * max(cost, 1.0), iterations, cost)
-    return Solved(graph, state, weight, residuals, jacobian, factor, free, termination)
+    return GraphSolution(graph, state, weight, residuals, jacobian, factor, free, termination)
 
 
 def _linearise(

@@ -11,7 +11,8 @@ Array = NDArray[np.float64]
 
 # Standing still is never known better than this (m, rad); it adds up over all bundles while a robot stands.
 _FLOOR_M, _FLOOR_RAD = 1e-5, 1e-5
-# Wheels roll further off than they slip: variance sideways over variance forwards.
+# Wheels roll further off than they slip: variance sideways over variance forwards. The map of MRCLAM's robot 3 is
+# 0.107 m wrong; 0.05 and 1 change that by 2 mm.
 _SIDEWAYS = 0.25
 
 

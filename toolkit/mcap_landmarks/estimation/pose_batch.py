@@ -92,7 +92,7 @@ def solve_batch(
 def _minimise(
     observed: Observations, start: Poses, robust_dof: float | None, max_iterations: int
 ) -> tuple[Poses, NDArray[np.bool_], NDArray[np.int64]]:
-    """Levenberg-Marquardt on all problems, undamped while steps help; poses, who converged, steps. Solved leave."""
+    """Levenberg-Marquardt on all problems, undamped while steps help; poses, who converged, steps. Solved ones go."""
     result = Poses(*(a.copy() for a in start))
     converged = np.zeros(len(start.x), dtype=np.bool_)
     steps = np.full(len(start.x), max_iterations, dtype=np.int64)

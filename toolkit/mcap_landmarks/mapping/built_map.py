@@ -12,7 +12,7 @@ from mcap_landmarks.maps.model import LandmarkMap
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trajectory:
+class LogTrajectory:
     """Where a log's robot was: stamps and log times (T,), map_from_base (T, 3)."""
 
     stamps_ns: NDArray[np.int64]
@@ -24,5 +24,5 @@ class BuiltMap(NamedTuple):
     """A map, one trajectory in it per log, and how the solver ended; None where the method has none."""
 
     landmark_map: LandmarkMap
-    trajectories: list[Trajectory]
+    trajectories: list[LogTrajectory]
     termination: Termination | None

@@ -48,28 +48,31 @@ def into_one_frame(
     Raises:
         MapError: a log shares fewer than two landmarks with the rest.
     """
-    transforms: dict[int, Array] = {}
-    if known is None:
-        transforms[0] = np.zeros(3)
-        known = alone[0]
-    there = dict(zip(known[0].tolist(), known[1], strict=True))
+    places = [_by_number(*one) for one in alone]
+    transforms: dict[int, Array] = {} if known else {0: np.zeros(3)}
+    there = _by_number(*known) if known else dict(places[0])
     while len(transforms) < len(alone):
-        waiting = [i for i in range(len(alone)) if i not in transforms]
-        shared = {i: [n for n in alone[i][0].tolist() if n in there] for i in waiting}
-        best = max(waiting, key=lambda i: len(shared[i]))
+        shared = {i: [n for n in place if n in there] for i, place in enumerate(places) if i not in transforms}
+        best = max(shared, key=lambda i: len(shared[i]))
         if len(shared[best]) < 2:
             raise MapError(
                 f"log {best + 1} shares {len(shared[best])} landmarks with the others, but one frame takes two; "
                 "map it on its own or add a log that overlaps with both"
             )
-        place = dict(zip(alone[best][0].tolist(), alone[best][1], strict=True))
-        onto = np.array([there[n] for n in shared[best]])
-        transforms[best] = align(np.array([place[n] for n in shared[best]]), onto)
-        for number, point in place.items():
+        transforms[best] = align(_at(places[best], shared[best]), _at(there, shared[best]))
+        for number, point in places[best].items():
             there.setdefault(number, se2.transform_points(transforms[best], point))
-    numbers = np.array(sorted(there), dtype=np.int64)
-    landmarks = np.array([there[n] for n in numbers.tolist()]).reshape(-1, 2)
-    return [transforms[i] for i in range(len(alone))], numbers, landmarks
+    numbers = sorted(there)
+    return [transforms[i] for i in range(len(alone))], np.array(numbers, dtype=np.int64), _at(there, numbers)
+
+
+def _by_number(numbers: Ints, positions_xy: Array) -> dict[int, Array]:
+    return dict(zip(numbers.tolist(), positions_xy, strict=True))
+
+
+def _at(places: dict[int, Array], numbers: list[int]) -> Array:
+    """Positions (N, 2) of the landmarks with these numbers."""
+    return np.array([places[n] for n in numbers]).reshape(-1, 2)
 
 
 def _fit(points_xy: Array, onto_xy: Array) -> Array:

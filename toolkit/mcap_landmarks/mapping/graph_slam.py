@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import MapError
-from mcap_landmarks.estimation.factor_graph import Graph, Solved, State, minimise
+from mcap_landmarks.estimation.factor_graph import Graph, GraphSolution, State, minimise
 from mcap_landmarks.estimation.termination import Termination
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.mapping.common_frame import into_one_frame
@@ -96,13 +96,13 @@ def _solve_together(
     alone: Sequence[LogSolution],
     config: BuildMapConfig,
     known: KnownLandmarks | None,
-) -> tuple[Ints, Solved]:
+) -> tuple[Ints, GraphSolution]:
     """Numbers (L,) of all landmarks, and the minimum of the graph of all logs from where each of them got alone."""
     parts = [(log.numbers, log.solved.state.landmarks_xy) for log in alone]
     transforms, numbers, landmarks = into_one_frame(parts, None if known is None else (known.number, known.xy))
     pairs = zip(transforms, alone, strict=True)
     poses = np.concatenate([se2.compose(transform, log.solved.state.poses) for transform, log in pairs])
-    graph = _stack(logs, [log.noise for log in alone], numbers, known)
+    graph = _joint_graph(logs, [log.noise for log in alone], numbers, known)
     solved = minimise(graph, State(poses, landmarks), config.robust_dof, config.max_iterations)
     if len(logs) == 1:
         return numbers, solved
@@ -127,15 +127,21 @@ def _check(ended: Termination, logs: int) -> None:
         )
 
 
-def _stack(
+def _joint_graph(
     logs: Sequence[LandmarkObservations], noise: Sequence[LogNoise], numbers: Ints, known: KnownLandmarks | None
 ) -> Graph:
-    """The graphs of all logs as one, poses in a row, with the known landmarks."""
+    """The graphs of all logs as one, with the known landmarks."""
     rows = [np.searchsorted(numbers, log.landmark) for log in logs]
-    graphs = [graph_of(log, row, n) for log, row, n in zip(logs, rows, noise, strict=True)]
+    graph = _stack([graph_of(log, row, n) for log, row, n in zip(logs, rows, noise, strict=True)], logs)
+    if known is None:
+        return graph
+    root = np.linalg.inv(np.linalg.cholesky(known.covariance))
+    return replace(graph, prior_landmark=np.searchsorted(numbers, known.number), prior_xy=known.xy, prior_root=root)
+
+
+def _stack(graphs: Sequence[Graph], logs: Sequence[LandmarkObservations]) -> Graph:
+    """The graphs of all logs as one, without known landmarks; the poses of all stand in a row."""
     before = np.cumsum([0, *(len(log) for log in logs)])[:-1]
-    none = graphs[0]
-    inverse_root = none.prior_root if known is None else np.linalg.inv(np.linalg.cholesky(known.covariance))
     return Graph(
         np.concatenate([g.observation_pose + b for g, b in zip(graphs, before, strict=True)]),
         np.concatenate([g.observation_landmark for g in graphs]),
@@ -145,9 +151,9 @@ def _stack(
         np.concatenate([g.motion_pose + b for g, b in zip(graphs, before, strict=True)]),
         np.concatenate([g.motion for g in graphs]),
         np.concatenate([g.motion_root for g in graphs]),
-        none.prior_landmark if known is None else np.searchsorted(numbers, known.number),
-        none.prior_xy if known is None else known.xy,
-        inverse_root,
+        graphs[0].prior_landmark,
+        graphs[0].prior_xy,
+        graphs[0].prior_root,
     )
 
 
@@ -160,7 +166,7 @@ def _relocate(logs: Sequence[LandmarkObservations], graph: Graph, at: State, rob
     return State(at.poses, moved)
 
 
-def _fitting(logs: Sequence[LandmarkObservations], noise: Sequence[LogNoise], solved: Solved) -> Ints:
+def _fitting(logs: Sequence[LandmarkObservations], noise: Sequence[LogNoise], solved: GraphSolution) -> Ints:
     """How many observations (L,) of each landmark lie where it is, each by its own covariance alone."""
     graph = solved.graph
     raw = np.linalg.solve(graph.observation_root, solved.residuals[0][..., None])[..., 0]

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.estimation.factor_graph import Solved, State, minimise
+from mcap_landmarks.estimation.factor_graph import GraphSolution, State, minimise
 from mcap_landmarks.estimation.odometry import Motions, dead_reckoning
 from mcap_landmarks.estimation.robust import student_loss
 from mcap_landmarks.mapping.config import BuildMapConfig
@@ -24,7 +24,7 @@ _CANDIDATES = 25
 _ROUGHLY = 8
 
 
-def solve_alone(log: LandmarkObservations, noise: LogNoise, config: BuildMapConfig) -> tuple[Ints, Solved]:
+def solve_alone(log: LandmarkObservations, noise: LogNoise, config: BuildMapConfig) -> tuple[Ints, GraphSolution]:
     """Landmark numbers (L,) of a log and the minimum of its graph, in the frame of its odometry.
 
     Incremental: it grows from the first poses on, and each stretch starts by dead reckoning from what is already

@@ -1,6 +1,6 @@
 """The default way to build a map: a submap of each log, all merged, then poses and landmarks solved together."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.estimation.polar import polar_from_points
 from mcap_landmarks.geometry.se2 import Array
-from mcap_landmarks.mapping.built_map import BuiltMap, Trajectory
+from mcap_landmarks.mapping.built_map import BuiltMap, LogTrajectory
 from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.confirmation import confirmed
 from mcap_landmarks.mapping.data_association import UNLABELLED
@@ -17,7 +17,7 @@ from mcap_landmarks.mapping.groups import groups_of
 from mcap_landmarks.mapping.log_graph import LandmarkObservations
 from mcap_landmarks.mapping.merge_logs import MergedLandmarks, merge_logs
 from mcap_landmarks.mapping.observations import LogObservations
-from mcap_landmarks.mapping.submap import build_submap, motions_of
+from mcap_landmarks.mapping.submap import Submap, build_submap, motions_of
 from mcap_landmarks.maps.model import LandmarkMap, Source
 
 Ints = NDArray[np.int64]
@@ -34,29 +34,43 @@ def solve_jointly(logs: Sequence[LogObservations], prior: LandmarkMap | None, co
     Raises:
         MapError: a log has nothing to map or cannot be merged with the others, or the solver did not converge.
     """
-    empty = [str(i + 1) for i, log in enumerate(logs) if not len(log.bundle)]
-    if empty:
-        raise MapError(f"log {', '.join(empty)} holds no object in any bundle with odometry; leave it out")
+    _check_seen(logs)
     names = sorted({name for log in logs for name in log.classes} | set(prior.classes if prior else ()))
     id_of_class = {name: i for i, name in enumerate(names)}
     class_ids = [np.array([id_of_class[name] for name in log.classes], dtype=np.int64) for log in logs]
     submaps = [build_submap(log, ids, config) for log, ids in zip(logs, class_ids, strict=True)]
-    known = None
-    if prior is not None:
-        known = np.array([id_of_class[name] for name in prior.classes], dtype=np.int64), prior.positions_xy
+    known = _placed(prior, id_of_class) if prior is not None else None
     merged = merge_logs(submaps, known, config)
-    numbers = [
-        np.where(submap.landmark == UNLABELLED, UNLABELLED, of_log[submap.landmark])
-        for submap, of_log in zip(submaps, merged.of_log, strict=True)
-    ]
+    numbers = [_numbers(submap, of_log) for submap, of_log in zip(submaps, merged.of_log, strict=True)]
     labelled = [_labelled(log, number) for log, number in zip(logs, numbers, strict=True)]
     solution = solve_map(labelled, config, _known(prior, config))
     landmark_map = _map_of(logs, numbers, merged, solution, names, prior, config)
     trajectories = [
-        Trajectory(log.stamps_ns, log.log_times_ns, poses)
+        LogTrajectory(log.stamps_ns, log.log_times_ns, poses)
         for log, poses in zip(logs, solution.trajectories, strict=True)
     ]
     return BuiltMap(landmark_map, trajectories, solution.termination)
+
+
+def _check_seen(logs: Sequence[LogObservations]) -> None:
+    """Refuse logs that saw nothing.
+
+    Raises:
+        MapError: as it says.
+    """
+    empty = [str(i + 1) for i, log in enumerate(logs) if not len(log.bundle)]
+    if empty:
+        raise MapError(f"log {', '.join(empty)} holds no object in any bundle with odometry; leave it out")
+
+
+def _placed(prior: LandmarkMap, id_of_class: Mapping[str, int]) -> tuple[Ints, Array]:
+    """Class ids (Q,) and positions (Q, 2) of a map's landmarks."""
+    return np.array([id_of_class[name] for name in prior.classes], dtype=np.int64), prior.positions_xy
+
+
+def _numbers(submap: Submap, of_log: Ints) -> Ints:
+    """The number (N,) of each observation's landmark in the map of all logs."""
+    return np.where(submap.landmark == UNLABELLED, UNLABELLED, of_log[submap.landmark])
 
 
 def _labelled(log: LogObservations, number: Ints) -> LandmarkObservations:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.estimation.factor_graph import Solved
+from mcap_landmarks.estimation.factor_graph import GraphSolution
 
 Array = NDArray[np.float64]
 
@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 _COLUMNS_AT_ONCE = 200
 
 
-def landmark_covariances(solved: Solved, *, free_frame: bool) -> Array:
+def landmark_covariances(solved: GraphSolution, *, free_frame: bool) -> Array:
     """Covariances (L, 2, 2) of the landmarks; in a free frame without what moves all of them as one rigid body.
 
     That part says where the robot stood when it switched on, not how good the map is. It leaves by an S-transformation
@@ -31,7 +31,7 @@ def landmark_covariances(solved: Solved, *, free_frame: bool) -> Array:
     return _with_inner_constraints(blocks, solved) if free_frame else blocks
 
 
-def _with_inner_constraints(blocks: Array, solved: Solved) -> Array:
+def _with_inner_constraints(blocks: Array, solved: GraphSolution) -> Array:
     """The landmarks' covariances (L, 2, 2) once a shift and a turn of all of them are taken out."""
     rigid = _rigid_motions(solved.state.landmarks_xy)
     right = np.zeros((len(solved.free), 3))

@@ -7,7 +7,7 @@ import numpy as np
 
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.se2 import Array, transform_points
-from mcap_landmarks.mapping.built_map import BuiltMap, Trajectory
+from mcap_landmarks.mapping.built_map import BuiltMap, LogTrajectory
 from mcap_landmarks.mapping.observations import LogObservations, left_to_right
 from mcap_landmarks.maps.model import Group, LandmarkMap, Source
 
@@ -44,7 +44,7 @@ def solve_as_in_the_thesis(logs: Sequence[LogObservations]) -> BuiltMap:
             groups[classes] = _Triangle(points, pose, known.observations + 1 if known else 1)
             used += 1
         sources.append(Source("recording", log.fingerprint, log.bundles, used))
-        trajectories.append(Trajectory(log.stamps_ns, log.log_times_ns, log.odom_from_base))
+        trajectories.append(LogTrajectory(log.stamps_ns, log.log_times_ns, log.odom_from_base))
     if not groups:
         raise MapError("no bundle has exactly three objects, which the thesis's method needs; use method = default")
     return BuiltMap(_map_of(groups, tuple(sources)), trajectories, None)

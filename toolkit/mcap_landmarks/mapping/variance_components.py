@@ -5,7 +5,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.estimation.factor_graph import Solved, minimise
+from mcap_landmarks.estimation.factor_graph import GraphSolution, minimise
 from mcap_landmarks.estimation.odometry import OdometryNoise
 from mcap_landmarks.estimation.termination import Termination
 from mcap_landmarks.mapping.config import BuildMapConfig
@@ -41,7 +41,7 @@ class LogSolution:
     """
 
     numbers: Ints
-    solved: Solved
+    solved: GraphSolution
     noise: LogNoise
     termination: Termination
     iterations: int
@@ -87,7 +87,7 @@ def assumed_noise(place: Ints, odometry: OdometryNoise) -> LogNoise:
 
 
 def estimate_noise(
-    log: LandmarkObservations, place: Ints, odometry: OdometryNoise, solved: Solved, seed: int = 0
+    log: LandmarkObservations, place: Ints, odometry: OdometryNoise, solved: GraphSolution, seed: int = 0
 ) -> LogNoise:
     """Noise of a log from the residuals of its graph, solved with this `odometry` noise.
 
@@ -119,7 +119,7 @@ def _largest_change(before: LogNoise, after: LogNoise) -> float:
     return float((np.abs(new - old) / np.maximum(old, 1e-12)).max())
 
 
-def _redundancy(solved: Solved, seed: int) -> Array:
+def _redundancy(solved: GraphSolution, seed: int) -> Array:
     """Share of each whitened residual that the fit could not absorb, by random probes (Hutchinson 1990)."""
     jacobian = solved.jacobian
     probes = np.random.default_rng(seed).normal(size=(jacobian.shape[0], _PROBES))

@@ -9,7 +9,7 @@ from mcap_landmarks.channels import MAP_MARKERS, MAP_PATH, MAP_POSE
 from mcap_landmarks.estimation.termination import Termination
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, Manifest, Outcome, stage_records
-from mcap_landmarks.mapping.built_map import Trajectory
+from mcap_landmarks.mapping.built_map import LogTrajectory
 from mcap_landmarks.maps.database import read_manifest, read_map
 from mcap_landmarks.maps.map_markers import markers_from_map
 from mcap_landmarks.maps.model import LandmarkMap, Source
@@ -101,7 +101,7 @@ def _difference(entries: Mapping[str, str], plan: MapPlan) -> str:
     return "there was no such map" if earlier is None else plan.record.difference(earlier)
 
 
-def write_part(plan: MapPlan, log: LogPlan, landmark_map: LandmarkMap, trajectory: Trajectory, parts: Path) -> None:
+def write_part(plan: MapPlan, log: LogPlan, landmark_map: LandmarkMap, trajectory: LogTrajectory, parts: Path) -> None:
     """One log's results of the map as a recording of their own."""
     record = plan.share(log)
     with create_recording(part_file(parts, record)) as writer:
@@ -110,7 +110,7 @@ def write_part(plan: MapPlan, log: LogPlan, landmark_map: LandmarkMap, trajector
         writer.metadata[RUN] = Manifest("part", fingerprint=record.key, stages=(record,)).entries()
 
 
-def _results(landmark_map: LandmarkMap, trajectory: Trajectory) -> Iterator[Stamped]:
+def _results(landmark_map: LandmarkMap, trajectory: LogTrajectory) -> Iterator[Stamped]:
     frame = landmark_map.frame
     poses = [
         PoseStamped.planar(int(stamp), frame, pose)

@@ -13,29 +13,21 @@ from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.mapping.thesis import solve_as_in_the_thesis
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.maps.scene_objects import known_covariances
-from mcap_landmarks.stage import Bundle, Reduction, Tolerance
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.stage import Bundle, OdometryAt, Reduction, Tolerance
 
 
 def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservations:
     """What one log saw: its bundles that have odometry, and their objects."""
-    count = 0
-    kept: list[Bundle] = []
-    scenes = []
-    for bundle in bundles:
-        scene = bundle.get(SCENE_OBJECTS)
-        count += 1
-        if scene is not None and bundle.odometry is not None and (not kept or bundle.stamp_ns > kept[-1].stamp_ns):
-            kept.append(bundle)
-            scenes.append(scene)
-    trail = [bundle.odometry for bundle in kept if bundle.odometry is not None]
+    kept, scenes, odometry, count = _usable(bundles)
     sizes = [len(scene) for scene in scenes]
     spread = [known_covariances(scene, config.range_sigma_m, config.bearing_sigma_rad) for scene in scenes]
     return LogObservations(
         np.array([bundle.stamp_ns for bundle in kept], dtype=np.int64),
         np.array([bundle.log_time_ns for bundle in kept], dtype=np.int64),
-        np.array([at.odom_from_base for at in trail]).reshape(-1, 3),
-        np.array([at.way_m for at in trail]),
-        np.array([at.turned_rad for at in trail]),
+        np.array([at.odom_from_base for at in odometry]).reshape(-1, 3),
+        np.array([at.way_m for at in odometry]),
+        np.array([at.turned_rad for at in odometry]),
         np.repeat(np.arange(len(kept)), sizes),
         tuple(name for scene in scenes for name in scene.classes),
         np.concatenate([np.zeros((0, 2)), *(scene.positions_xy for scene in scenes)]),
@@ -43,6 +35,20 @@ def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservation
         np.concatenate([np.zeros(0), *(scene.radii_m for scene in scenes)]),
         count,
     )
+
+
+def _usable(bundles: Iterable[Bundle]) -> tuple[list[Bundle], list[SceneObjects], list[OdometryAt], int]:
+    """The bundles with a scene, odometry and a stamp after the last one's, both of these, and the number of all."""
+    kept: list[Bundle] = []
+    scenes, odometry, count = [], [], 0
+    for bundle in bundles:
+        scene, at = bundle.get(SCENE_OBJECTS), bundle.odometry
+        count += 1
+        if scene is not None and at is not None and (not kept or bundle.stamp_ns > kept[-1].stamp_ns):
+            kept.append(bundle)
+            scenes.append(scene)
+            odometry.append(at)
+    return kept, scenes, odometry, count
 
 
 def solve(logs: Sequence[LogObservations], prior: LandmarkMap | None, config: BuildMapConfig) -> BuiltMap:
