@@ -1,14 +1,14 @@
 """The default fusion: detections assigned to tracks in the scan, each of which keeps the class it has earned."""
 
-from mcap_landmarks.fusion.association import assign, candidates, hit_ratio
+from mcap_landmarks.fusion.box_association import assign, candidates, hit_ratio
 from mcap_landmarks.fusion.box_geometry import box_geometry
 from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.inheritance import inherit
 from mcap_landmarks.fusion.redundancy import RedundancyCheck
-from mcap_landmarks.fusion.scene import scene_of
+from mcap_landmarks.fusion.scene_building import scene_of
 from mcap_landmarks.fusion.track_history import observe
-from mcap_landmarks.fusion.tracks import STALE, Tracks
+from mcap_landmarks.fusion.tracks import STALE, TrackTable
 from mcap_landmarks.fusion.visibility import is_missed, nearness_of
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.detections import Detections
@@ -20,7 +20,7 @@ class Fuser:
     """Fuses scan after scan. Its state is what each track in the scan has been taken for so far."""
 
     def __init__(self, config: FuseConfig) -> None:
-        self._tracks = Tracks(config)
+        self._tracks = TrackTable(config)
         self._redundancy = RedundancyCheck(self._tracks)
 
     def add(

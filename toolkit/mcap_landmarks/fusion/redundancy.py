@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from mcap_landmarks.fusion.track_history import is_redundant, where_redundant
-from mcap_landmarks.fusion.tracks import Tracks
+from mcap_landmarks.fusion.tracks import TrackTable
 
 
 @dataclass(slots=True)
@@ -14,7 +14,7 @@ class RedundancyCheck:
     That is judged at images; `bundle` and `stamp_ns` are those of the last one.
     """
 
-    tracks: Tracks
+    tracks: TrackTable
     bundle: int = 0
     stamp_ns: int = 0
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mcap_landmarks.fusion.centres import centre_of
 from mcap_landmarks.fusion.class_belief import ClassBelief
+from mcap_landmarks.fusion.class_centres import centre_of
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.place_grid import PlaceGrid
 from mcap_landmarks.fusion.track_history import TrackHistory
@@ -60,7 +60,7 @@ class Track:
         return float(np.clip(turned / _TURNED_RAD + nearer / _NEARER, STALE, 1.0))
 
 
-class Tracks:
+class TrackTable:
     """All tracks by id, the one that was seen longest ago first.
 
     `bundle` counts the scans, `shaped` has the classes that shapes in scans so far were of, `grid` tells where tracks

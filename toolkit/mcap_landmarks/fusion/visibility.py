@@ -8,7 +8,7 @@ import numpy as np
 from mcap_landmarks.fusion.box_geometry import BoxGeometry
 from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.fusion.config import FuseConfig
-from mcap_landmarks.fusion.tracks import Tracks
+from mcap_landmarks.fusion.tracks import TrackTable
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.scan_objects import ScanObjects
 
@@ -35,7 +35,7 @@ def nearness_of(
 
 
 def is_missed(
-    objects: ScanObjects, i: int, tracks: Tracks, view: CameraView, boxes: BoxGeometry, nearness: Array
+    objects: ScanObjects, i: int, tracks: TrackTable, view: CameraView, boxes: BoxGeometry, nearness: Array
 ) -> bool:
     """Whether the image would show an object, large enough, and has no box that it could be in or behind."""
     class_name, _ = tracks[objects.ids[i]].belief.best()

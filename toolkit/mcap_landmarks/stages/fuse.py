@@ -18,7 +18,7 @@ from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.fuser import Fuser
-from mcap_landmarks.fusion.markers import markers_from_scene
+from mcap_landmarks.fusion.scene_markers import markers_from_scene
 from mcap_landmarks.fusion.selection import at_least, usable, wanted
 from mcap_landmarks.fusion.thesis import fuse_in_order
 from mcap_landmarks.geometry.camera import CameraModel

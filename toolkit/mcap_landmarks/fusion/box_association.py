@@ -9,8 +9,8 @@ from scipy.optimize import linear_sum_assignment
 
 from mcap_landmarks.fusion.box_geometry import BoxGeometry, misfits
 from mcap_landmarks.fusion.camera_view import CameraView
-from mcap_landmarks.fusion.centres import centres_of, radii_in_boxes
-from mcap_landmarks.fusion.tracks import Tracks
+from mcap_landmarks.fusion.class_centres import centres_of, radii_in_boxes
+from mcap_landmarks.fusion.tracks import TrackTable
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.scan_objects import ScanObjects
 
@@ -32,7 +32,7 @@ _USUAL_FIT = 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Candidates:
+class BoxCandidates:
     """M boxes as N objects: ratios (M, N), how much likelier a box is if it is of an object than if it is of something
     that the scan does not show, 0 where it cannot be; the same with what is known of the objects in `odds` (M, N); how
     far aside the object is (M, N), in sigmas; radii_m (M, N) that it would have.
@@ -45,11 +45,11 @@ class Candidates:
 
 
 def candidates(
-    objects: ScanObjects, tracks: Tracks, view: CameraView, boxes: BoxGeometry, names: Sequence[str]
-) -> Candidates:
+    objects: ScanObjects, tracks: TrackTable, view: CameraView, boxes: BoxGeometry, names: Sequence[str]
+) -> BoxCandidates:
     """Every box, with its class, as every object; a gate (Bar-Shalom and Fortmann 1988) decides what it can be."""
     shape, config = (len(names), len(objects)), tracks.config
-    found = Candidates(np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape))
+    found = BoxCandidates(np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape))
     for box, name in enumerate(names):
         size = config.size(name)
         found.radii_m[box] = radii_in_boxes(objects, view, boxes, box, size)
@@ -79,7 +79,7 @@ def assign(odds: Array) -> list[Pair]:
     return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if j < objects and odds[i, j] > 1]
 
 
-def hit_ratio(found: Candidates, pairs: Sequence[Pair], pair: Pair, score: float) -> float:
+def hit_ratio(found: BoxCandidates, pairs: Sequence[Pair], pair: Pair, score: float) -> float:
     """How much likelier a box is if it is of its object than if not, given what else it could be of, and its score.
 
     That is nothing in the scan, or an object that no other box is of. A box that the detector is not sure of tells

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mcap_landmarks.fusion.centres import is_resolved
-from mcap_landmarks.fusion.tracks import Tracks
+from mcap_landmarks.fusion.class_centres import is_resolved
+from mcap_landmarks.fusion.tracks import TrackTable
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.hypotheses import Hypotheses
 from mcap_landmarks.messages.scan_objects import ScanObjects
@@ -28,14 +28,9 @@ class _Found(NamedTuple):
     radius_m: float
 
 
-def scene_of(objects: ScanObjects, tracks: Tracks) -> SceneObjects:
+def scene_of(objects: ScanObjects, tracks: TrackTable) -> SceneObjects:
     """Objects whose class is known well enough; of several of one class in one place the surest."""
-    kept: list[_Found] = []
-    for one in sorted(_found(objects, tracks), key=lambda one: (-one.options[0][1], one.i)):
-        same = [other for other in kept if other.options[0][0] == one.options[0][0]]
-        if all(np.hypot(*(one.position_xy - other.position_xy)) > _APART * one.radius_m for other in same):
-            kept.append(one)
-    kept.sort(key=lambda one: one.i)
+    kept = sorted(_apart(_found(objects, tracks)), key=lambda one: one.i)
     return SceneObjects(
         objects.stamp_ns,
         objects.frame_id,
@@ -47,7 +42,17 @@ def scene_of(objects: ScanObjects, tracks: Tracks) -> SceneObjects:
     )
 
 
-def _found(objects: ScanObjects, tracks: Tracks) -> list[_Found]:
+def _apart(found: list[_Found]) -> list[_Found]:
+    """The surest first; none of a class in the place of a surer one."""
+    kept: list[_Found] = []
+    for one in sorted(found, key=lambda one: (-one.options[0][1], one.i)):
+        same = [other for other in kept if other.options[0][0] == one.options[0][0]]
+        if all(np.hypot(*(one.position_xy - other.position_xy)) > _APART * one.radius_m for other in same):
+            kept.append(one)
+    return kept
+
+
+def _found(objects: ScanObjects, tracks: TrackTable) -> list[_Found]:
     """Objects that are sure enough of a class, whose boxes no other track explains, and whose centre the scan shows."""
     found = []
     for i, track in enumerate(objects.ids):
