@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from mcap_landmarks.geometry.se2 import between, compose, inverse, transform_points
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.scene import SceneObjects
 from numpy.typing import NDArray
 
@@ -76,7 +76,7 @@ def _world(rng: np.random.Generator, points: Array, class_of: NDArray[np.int64],
         np.zeros(count),
         np.ones(count, dtype=np.int64),
         np.zeros(count, dtype=np.bool_),
-        sources=(Source("reference", "simulated"),),
+        sources=(MapSource("reference", "simulated"),),
     )
     return World(points, np.asarray(class_of), np.arange(count) // 3, mapped)
 

@@ -10,7 +10,7 @@ import pytest
 from mcap_landmarks.channels import MATCH, POSE
 from mcap_landmarks.cli.console import moment
 from mcap_landmarks.maps.database import read_map, write_map
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.resources import resource
@@ -77,7 +77,7 @@ def test_it_says_so_in_words(folder: Path, capsys: pytest.CaptureFixture[str]) -
 def test_bundles_before_are_joined(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     surveyed = read_map(folder / "map.db")
     classes = tuple(f"kind {i % 3}" for i in range(len(surveyed)))
-    repeated = LandmarkMap.surveyed(surveyed.ids, classes, surveyed.positions_xy, Source("import", "test"))
+    repeated = LandmarkMap.surveyed(surveyed.ids, classes, surveyed.positions_xy, MapSource("import", "test"))
     write_map(tmp_path / "map.db", repeated)
     renamed = dict(zip(surveyed.classes, classes, strict=True))
     log = write(tmp_path / "log.mcap", messages(seed=2, renamed=renamed))

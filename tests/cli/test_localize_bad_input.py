@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from mcap_landmarks.channels import MATCH, POSE, SCENE_OBJECTS
 from mcap_landmarks.maps.database import write_map
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import Stamped
 
 from tests.cli.calls import call, refused, topics
 from tests.cli.logs import messages, write
 
-SOURCE = Source("import", "test")
+SOURCE = MapSource("import", "test")
 KINDS = ("hydrant", "person", "suitcase")
 
 

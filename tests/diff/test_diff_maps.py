@@ -10,7 +10,7 @@ from mcap_landmarks.diff.comparison import diff
 from mcap_landmarks.diff.maps import moved
 from mcap_landmarks.manifest import Manifest
 from mcap_landmarks.maps.database import write_map
-from mcap_landmarks.maps.model import Group, LandmarkMap, Source
+from mcap_landmarks.maps.model import Group, LandmarkMap, MapSource
 
 from tests.maps.examples import small_map
 
@@ -113,6 +113,6 @@ def test_settings_were_meant_to_differ(tmp_path: Path) -> None:
 
 
 def test_sources_were_meant_to_differ(tmp_path: Path) -> None:
-    document = compare(tmp_path, replace(small_map(), sources=(Source("recording", "cafe", 7, 7),)))
+    document = compare(tmp_path, replace(small_map(), sources=(MapSource("recording", "cafe", 7, 7),)))
     assert document["verdict"] == "same"
     assert {"key": "sources.recording.cafe", "baseline": None, "candidate": "7 of 7 bundles"} in document["manifest"]

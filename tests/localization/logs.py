@@ -8,7 +8,7 @@ import numpy as np
 from mcap_landmarks.channels import MATCH, SCENE_OBJECTS
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.maps.database import write_map
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.maps.scene_objects import pick
 from mcap_landmarks.messages.match import LandmarkMatch
 from mcap_landmarks.recording.writer import create_recording
@@ -44,7 +44,7 @@ def localized(
 ) -> list[Stamped]:
     """What localize makes of bundles."""
     names = tuple(f"l{i}" for i in range(len(classes)))
-    write_map(folder / "map.db", LandmarkMap.surveyed(names, classes, positions, Source("import", "test")))
+    write_map(folder / "map.db", LandmarkMap.surveyed(names, classes, positions, MapSource("import", "test")))
     return [entry for entry in process(seen, config, {"map": folder / "map.db"}) if isinstance(entry, Stamped)]
 
 

@@ -12,7 +12,7 @@ from mcap_landmarks.localization.index import MapIndex
 from mcap_landmarks.localization.match import Match
 from mcap_landmarks.localization.matching import Matcher
 from mcap_landmarks.localization.sequence import SequenceLocalizer
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.match import Status
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import OdometryAt
@@ -132,7 +132,7 @@ def test_maps_that_cannot_localize() -> None:
     nothing = dataclasses.replace(small_map(), tentative=np.ones(len(small_map()), dtype=bool), groups=())
     with pytest.raises(MapError, match="no confirmed landmarks"):
         MapIndex.build(nothing)
-    point = LandmarkMap.surveyed(("a", "b"), ("x", "x"), [[1.0, 2.0], [1.0, 2.0]], Source("import", "test"))
+    point = LandmarkMap.surveyed(("a", "b"), ("x", "x"), [[1.0, 2.0], [1.0, 2.0]], MapSource("import", "test"))
     with pytest.raises(MapError, match="lie in one place"):
         MapIndex.build(point)
 

@@ -1,7 +1,7 @@
 """A small map that several tests use, and how to compare maps."""
 
 import numpy as np
-from mcap_landmarks.maps.model import Group, LandmarkMap, Source
+from mcap_landmarks.maps.model import Group, LandmarkMap, MapSource
 
 
 def small_map() -> LandmarkMap:
@@ -18,7 +18,7 @@ def small_map() -> LandmarkMap:
             Group(("a", "b", "c"), np.array([0.0, -8.0, 1.5]), np.diag([0.01, 0.02, 0.003])),
             Group(("c", "b"), np.array([1.0, 8.0, -1.5])),
         ),
-        sources=(Source("recording", "f00d", 40, 38), Source("import", "beef")),
+        sources=(MapSource("recording", "f00d", 40, 38), MapSource("import", "beef")),
     )
 
 

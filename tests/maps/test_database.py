@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from mcap_landmarks.errors import MapError, UsageError
 from mcap_landmarks.maps.database import read_map, write_map
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 
 from tests.maps.examples import assert_same_map, small_map
 
@@ -30,7 +30,7 @@ def maps(draw: st.DrawFn) -> LandmarkMap:
         draw(arrays(np.float64, n, elements=st.floats(0, 5))),
         draw(arrays(np.int64, n, elements=st.integers(0, 10**6))),
         draw(arrays(np.bool_, n)),
-        sources=(Source("recording", "abc", 7, 5),),
+        sources=(MapSource("recording", "abc", 7, 5),),
     )
 
 
@@ -50,7 +50,7 @@ def test_groups_and_sources_survive(tmp_path: Path) -> None:
 
 def test_same_map_gives_same_bytes_over_an_old_one(tmp_path: Path) -> None:
     first, second = tmp_path / "a.db", tmp_path / "b.db"
-    write_map(first, LandmarkMap.surveyed(("x",), ("person",), [[1, 2]], Source("import", "f")))
+    write_map(first, LandmarkMap.surveyed(("x",), ("person",), [[1, 2]], MapSource("import", "f")))
     write_map(first, small_map())
     write_map(second, small_map())
     assert first.read_bytes() == second.read_bytes()

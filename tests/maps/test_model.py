@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.maps.map_message import map_from_scene, scene_from_map
-from mcap_landmarks.maps.model import Group, LandmarkMap, Source
+from mcap_landmarks.maps.model import Group, LandmarkMap, MapSource
 from mcap_landmarks.messages.codec import decode, encode
 from mcap_landmarks.messages.scene import SceneObjects
 
@@ -45,9 +45,9 @@ def test_groups_and_sources_are_checked() -> None:
     with pytest.raises(MapError, match="group a: covariance"):
         Group(("a",), np.zeros(3), np.zeros((3, 3)))
     with pytest.raises(MapError, match="used 3 of 2"):
-        Source("recording", "f", 2, 3)
+        MapSource("recording", "f", 2, 3)
     with pytest.raises(MapError, match="needs a kind"):
-        Source("import", "")
+        MapSource("import", "")
 
 
 def test_arrays_are_copied_read_only_and_symmetric() -> None:
@@ -68,7 +68,7 @@ def test_a_map_may_be_empty() -> None:
 
 def test_a_scene_carries_the_confirmed_landmarks() -> None:
     scene = decode(SceneObjects, encode(scene_from_map(small_map(), 17)))
-    source = Source("reference", "cafe")
+    source = MapSource("reference", "cafe")
     found = map_from_scene(scene, source)
     assert scene.stamp_ns == 17
     kept = small_map()
@@ -88,4 +88,4 @@ def test_a_scene_carries_the_confirmed_landmarks() -> None:
 def test_an_empty_scene_is_no_map() -> None:
     nothing = SceneObjects(0, "map", (), (), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0))
     with pytest.raises(MapError, match="a map needs landmarks"):
-        map_from_scene(nothing, Source("reference", "cafe"))
+        map_from_scene(nothing, MapSource("reference", "cafe"))

@@ -13,7 +13,7 @@ from mcap_landmarks.evaluation.read import read_run
 from mcap_landmarks.evaluation.trajectory import nearest
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.maps.database import write_map
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.recording.writer import create_recording
@@ -30,7 +30,7 @@ def write_snapshots(source: Path, log: Path, database: Path) -> None:
     """Every eighth snapshot as a bundle with its true pose, and the surveyed map of its landmarks."""
     content = loadmat(source)
     names = tuple(f"landmark_{int(row[0])}" for row in content["landmark"])
-    write_map(database, LandmarkMap.surveyed(names, names, content["landmark"][:, 1:], Source("reference", "mat")))
+    write_map(database, LandmarkMap.surveyed(names, names, content["landmark"][:, 1:], MapSource("reference", "mat")))
     seen = content["measurement"][np.argsort(content["measurement"][:, 0], kind="stable")]
     first = np.searchsorted(seen[:, 0], np.arange(1, len(content["groundtruth"]) + 2))
     with create_recording(log) as writer:

@@ -12,7 +12,7 @@ from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.evaluation.trajectory import Trajectory
 from mcap_landmarks.geometry.se2 import compose, transform_points
 from mcap_landmarks.maps.database import write_map
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.report.drawing import breaks, gather
 from mcap_landmarks.report.plots import FORMATS, figure, save
@@ -86,7 +86,7 @@ def test_positions_of_the_thesis_stand_alone() -> None:
 def test_many_classes_are_labelled_instead(tmp_path: Path) -> None:
     names = tuple(f"landmark_{i}" for i in range(12))
     positions = np.array([[i % 4, i // 4] for i in range(12)]) * 3.0
-    write_map(tmp_path / "m.db", LandmarkMap.surveyed(names, names, positions, Source("import", "f")))
+    write_map(tmp_path / "m.db", LandmarkMap.surveyed(names, names, positions, MapSource("import", "f")))
     axes = figure(gather([tmp_path / "m.db"], aligned=False)[0]).axes[0]
     assert [text.get_text() for text in axes.texts] == [str(i) for i in range(12)]
 
@@ -100,7 +100,7 @@ def test_alignment_moves_estimates_to_the_truth(tmp_path: Path) -> None:
 
 def test_alignment_of_a_map_alone_uses_its_landmarks(tmp_path: Path) -> None:
     there = LandmarkMap.surveyed(
-        LANDMARKS.ids, LANDMARKS.classes, transform_points(MOTION, LANDMARKS.positions_xy), Source("import", "f")
+        LANDMARKS.ids, LANDMARKS.classes, transform_points(MOTION, LANDMARKS.positions_xy), MapSource("import", "f")
     )
     write_map(tmp_path / "m.db", there)
     kept = [entry for entry in localized_messages() if entry[0] == TRUTH_POSE]

@@ -8,7 +8,7 @@ import pytest
 from mcap_landmarks.channels import MAP, MATCH, POSE, POSE_COVARIANCE, SCENE_OBJECTS, TF
 from mcap_landmarks.maps.database import write_map
 from mcap_landmarks.maps.exchange_thesis import parse_map
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.match import Status
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import Bundle, Stamped
@@ -25,7 +25,7 @@ def localized(folder: Path, config: LocalizeConfig, *, unique: bool = False, see
         classes = tuple(f"tag {i}" for i in range(len(positions)))
     names = tuple(f"l{i}" for i in range(len(classes)))
     database = folder / "map.db"
-    write_map(database, LandmarkMap.surveyed(names, classes, positions, Source("import", "test")))
+    write_map(database, LandmarkMap.surveyed(names, classes, positions, MapSource("import", "test")))
     return list(process(drive(circle(), classes, positions, seed), config, {"map": database}))
 
 
@@ -120,7 +120,7 @@ def test_geometry_too_weak_for_a_position(tmp_path: Path, landmarks: list[list[f
     places = np.array(landmarks)
     names = tuple(f"l{i}" for i in range(len(places)))
     database = tmp_path / "map.db"
-    write_map(database, LandmarkMap.surveyed(names, names, places, Source("import", "test")))
+    write_map(database, LandmarkMap.surveyed(names, names, places, MapSource("import", "test")))
     covariances = np.tile(np.diag([0.05**2, 0.1**2]), (len(places), 1, 1))
     options = tuple(((name, 1.0),) for name in names)
     seen = SceneObjects(1, "base", names, options, places, covariances, np.zeros(len(places)))

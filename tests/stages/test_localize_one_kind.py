@@ -8,7 +8,7 @@ from mcap_landmarks.channels import MATCH, POSE, POSE_COVARIANCE, SCENE_OBJECTS
 from mcap_landmarks.estimation.polar import points_from_polar
 from mcap_landmarks.geometry.se2 import Array, inverse, transform_points
 from mcap_landmarks.maps.database import write_map
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.match import LandmarkMatch, Status
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import Bundle, Stamped
@@ -43,7 +43,7 @@ def scene(number: int, pose: Array, landmarks: Array, rng: np.random.Generator, 
 
 def located(folder: Path, landmarks: Array, count: int, *, ranges: bool) -> list[Stamped]:
     names = tuple(f"l{i}" for i in range(len(landmarks)))
-    write_map(folder / "map.db", LandmarkMap.surveyed(names, names, landmarks, Source("import", "test")))
+    write_map(folder / "map.db", LandmarkMap.surveyed(names, names, landmarks, MapSource("import", "test")))
     rng = np.random.default_rng(5)
     scenes = [scene(i + 1, pose, landmarks, rng, ranges=ranges) for i, pose in enumerate(poses(count))]
     bundles = [Bundle(seen.stamp_ns, seen.stamp_ns, {SCENE_OBJECTS: seen}, None) for seen in scenes]

@@ -10,7 +10,7 @@ from mcap_landmarks.evaluation.read import read_reference, read_run
 from mcap_landmarks.evaluation.trajectory import interpolated
 from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.map_message import scene_from_map
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.match import Status
 
 _PAIRING = partial(interpolated, max_gap_ns=500_000_000)  # as evaluate's
@@ -18,7 +18,7 @@ _PAIRING = partial(interpolated, max_gap_ns=500_000_000)  # as evaluate's
 
 def metric_names() -> list[str]:
     """Every figure that there can be, by its dotted name."""
-    nothing = scene_from_map(LandmarkMap.surveyed((), (), [], Source("reference", "none")), 0)
+    nothing = scene_from_map(LandmarkMap.surveyed((), (), [], MapSource("reference", "none")), 0)
     statuses = {status.name.lower(): 0 for status in Status}
     document = evaluate(RunResult(NOWHERE, 0, 0, statuses, nothing), Reference(NOWHERE, nothing), _PAIRING)
     return [name for name in _flat(document) if name != "alignment"]

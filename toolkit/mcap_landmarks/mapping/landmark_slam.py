@@ -18,7 +18,7 @@ from mcap_landmarks.mapping.log_graph import LandmarkObservations
 from mcap_landmarks.mapping.merge_logs import MergedLandmarks, merge_logs
 from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.mapping.submap import Submap, build_submap, motions_of
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 
 Ints = NDArray[np.int64]
 
@@ -105,7 +105,7 @@ def _map_of(
         sized = fits[log.radii_m[fits] > 0]
         np.add.at(radii, number[sized], log.radii_m[sized])
         np.add.at(measured, number[sized], 1)
-        sources.append(Source("recording", log.fingerprint, log.bundles, len(np.unique(log.bundle[fits]))))
+        sources.append(MapSource("recording", log.fingerprint, log.bundles, len(np.unique(log.bundle[fits]))))
     row = solution.number
     ids = [f"l{number + 1}" for number in row]
     radius = radii[row] / np.maximum(measured[row], 1)

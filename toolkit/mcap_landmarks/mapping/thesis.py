@@ -9,7 +9,7 @@ from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.se2 import Array, transform_points
 from mcap_landmarks.mapping.built_map import BuiltMap, LogTrajectory
 from mcap_landmarks.mapping.observations import LogObservations, left_to_right
-from mcap_landmarks.maps.model import Group, LandmarkMap, Source
+from mcap_landmarks.maps.model import Group, LandmarkMap, MapSource
 
 
 @dataclass(slots=True)
@@ -43,14 +43,14 @@ def solve_as_in_the_thesis(logs: Sequence[LogObservations]) -> BuiltMap:
             points = transform_points(pose, log.points_xy[rows])
             groups[classes] = _Triangle(points, pose, known.observations + 1 if known else 1)
             used += 1
-        sources.append(Source("recording", log.fingerprint, log.bundles, used))
+        sources.append(MapSource("recording", log.fingerprint, log.bundles, used))
         trajectories.append(LogTrajectory(log.stamps_ns, log.log_times_ns, log.odom_from_base))
     if not groups:
         raise MapError("no bundle has exactly three objects, which the thesis's method needs; use method = default")
     return BuiltMap(_map_of(groups, tuple(sources)), trajectories, None)
 
 
-def _map_of(groups: dict[tuple[str, ...], _Triangle], sources: tuple[Source, ...]) -> LandmarkMap:
+def _map_of(groups: dict[tuple[str, ...], _Triangle], sources: tuple[MapSource, ...]) -> LandmarkMap:
     ids = [tuple(f"g{row}.{place}" for place in (1, 2, 3)) for row in range(1, len(groups) + 1)]
     n = 3 * len(groups)
     return LandmarkMap(

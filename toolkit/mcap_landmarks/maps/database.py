@@ -11,7 +11,7 @@ import numpy as np
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.locations import Location, to_read
-from mcap_landmarks.maps.model import Group, LandmarkMap, Source
+from mcap_landmarks.maps.model import Group, LandmarkMap, MapSource
 from mcap_landmarks.maps.neighbours import Neighbours
 from mcap_landmarks.resources import resource
 
@@ -137,7 +137,7 @@ def _map_of(database: sqlite3.Connection) -> LandmarkMap:
         tentative=rows["tentative"],
         groups=_read_groups(database, dict(zip(rows["number"].tolist(), ids, strict=True))),
         sources=tuple(
-            Source(*row)
+            MapSource(*row)
             for row in database.execute("SELECT kind, fingerprint, bundles, used FROM source ORDER BY number")
         ),
         frame=frame[0],

@@ -7,7 +7,7 @@ import io
 import numpy as np
 
 from mcap_landmarks.errors import MapError
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 
 NEEDED = ("id", "class", "x_m", "y_m")
 COLUMNS = (*NEEDED, "var_x_m2", "cov_xy_m2", "var_y_m2", "radius_m", "sightings")
@@ -40,7 +40,7 @@ def parse(text: str, name: str) -> LandmarkMap:
             numbers[:, 5],
             numbers[:, 6].astype(np.int64),
             np.zeros(len(rows), dtype=np.bool_),
-            sources=(Source("import", hashlib.sha256(text.encode()).hexdigest()),),
+            sources=(MapSource("import", hashlib.sha256(text.encode()).hexdigest()),),
         )
     except MapError as error:
         raise MapError(f"{name}: {error}") from error

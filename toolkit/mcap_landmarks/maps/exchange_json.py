@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from mcap_landmarks.errors import MapError
-from mcap_landmarks.maps.model import Group, LandmarkMap, Source, SourceKind
+from mcap_landmarks.maps.model import Group, LandmarkMap, MapSource, SourceKind
 
 _STRICT = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
 Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -85,7 +85,7 @@ def _landmark_map(document: _Document) -> LandmarkMap:
         np.array([row.sightings for row in rows], dtype=np.int64),
         np.array([row.tentative for row in rows], dtype=np.bool_),
         tuple(_group(row) for row in document.groups),
-        tuple(Source(row.kind, row.fingerprint, row.bundles, row.used) for row in document.sources),
+        tuple(MapSource(row.kind, row.fingerprint, row.bundles, row.used) for row in document.sources),
         document.frame,
     )
 

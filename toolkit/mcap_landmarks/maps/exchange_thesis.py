@@ -12,7 +12,7 @@ import numpy as np
 
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.se2 import Array
-from mcap_landmarks.maps.model import Group, LandmarkMap, Source
+from mcap_landmarks.maps.model import Group, LandmarkMap, MapSource
 
 T = TypeVar("T")
 
@@ -49,7 +49,7 @@ def parse_map(text: str, name: str) -> LandmarkMap:
         groups.append(Group(tuple(ids), np.array(pose)))
     if not groups:
         raise MapError(f"{name}: holds no group; expected lines like {_GROUP}")
-    source = Source("import", hashlib.sha256(text.encode()).hexdigest())
+    source = MapSource("import", hashlib.sha256(text.encode()).hexdigest())
     seen = Counter(identity for group in groups for identity in group.landmark_ids)
     n = len(identities)
     return LandmarkMap(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mcap_landmarks.errors import MapError
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.scene import SceneObjects
 
 
@@ -21,7 +21,7 @@ def scene_from_map(landmark_map: LandmarkMap, stamp_ns: int) -> SceneObjects:
     )
 
 
-def map_from_scene(scene: SceneObjects, source: Source) -> LandmarkMap:
+def map_from_scene(scene: SceneObjects, source: MapSource) -> LandmarkMap:
     """A surveyed map from a message such as `/ground_truth/objects`; no landmark counts as sighted.
 
     Raises:

@@ -14,7 +14,7 @@ SourceKind = Literal["recording", "reference", "import"]
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class MapSource:
     """One thing that a map was made from.
 
     fingerprint: identity by content, never by path or time. bundles: how many it had, used: how many of them took part.
@@ -75,7 +75,7 @@ class LandmarkMap:
     sightings: NDArray[np.int64]
     tentative: NDArray[np.bool_]
     groups: tuple[Group, ...] = ()
-    sources: tuple[Source, ...] = ()
+    sources: tuple[MapSource, ...] = ()
     frame: str = "map"
 
     def __post_init__(self) -> None:
@@ -110,7 +110,7 @@ class LandmarkMap:
 
     @classmethod
     def surveyed(
-        cls, ids: tuple[str, ...], classes: tuple[str, ...], positions_xy: ArrayLike, source: Source
+        cls, ids: tuple[str, ...], classes: tuple[str, ...], positions_xy: ArrayLike, source: MapSource
     ) -> "LandmarkMap":
         """Map of N known positions (N, 2) about which nothing else is known."""
         n = len(ids)

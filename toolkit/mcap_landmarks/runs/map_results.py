@@ -12,7 +12,7 @@ from mcap_landmarks.manifest import RUN, Manifest, Outcome, stage_records
 from mcap_landmarks.mapping.built_map import LogTrajectory
 from mcap_landmarks.maps.database import read_manifest, read_map
 from mcap_landmarks.maps.map_markers import markers_from_map
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.poses import Path as PathMessage
 from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.recording.writer import create_recording
@@ -48,7 +48,7 @@ class MapRun:
     termination: Termination | None
 
     @property
-    def sources(self) -> tuple[Source, ...]:
+    def sources(self) -> tuple[MapSource, ...]:
         """What the map says of the logs, in their order."""
         return self.landmark_map.sources[len(self.landmark_map.sources) - len(self.logs) :]
 

@@ -5,7 +5,7 @@ from mcap_landmarks.errors import MapError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.database import write_map
 from mcap_landmarks.maps.map_message import map_from_scene
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.recording.reader import open_recording
 
@@ -23,6 +23,6 @@ def map_from_reference(log: Location, target: Location) -> LandmarkMap:
                 f"{log}: there are no {TRUTH_OBJECTS.topic}; build the map from the log without --from-reference"
             )
         scene = decode(TRUTH_OBJECTS.message, raw.data)
-        landmark_map = map_from_scene(scene, Source("reference", recording.fingerprint()))
+        landmark_map = map_from_scene(scene, MapSource("reference", recording.fingerprint()))
     write_map(target, landmark_map)
     return landmark_map
