@@ -76,6 +76,7 @@ def test_words_document_and_picture(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert (document["clusters"], len(document["detections"]), document["status"]) == (1, 2, "localized")
 
 
+@pytest.mark.slow
 def test_a_log_of_scene_objects_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = localized_log(tmp_path / "r.mcap")
     assert call("explain", log, "--at", START_NS + 310_000_000, "-o", tmp_path / "e.svg") == 0
@@ -168,6 +169,7 @@ def test_a_log_without_matches(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "There is no match to explain; run localize on the log." in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_position_without_heading(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Ranges alone leave the heading open: none is told or drawn."""
     results = located(tmp_path, AROUND, 3, ranges=True)

@@ -87,6 +87,7 @@ def test_bundles_before_are_joined(folder: Path, tmp_path: Path, capsys: pytest.
     assert document["candidates"]
 
 
+@pytest.mark.slow
 def test_what_it_refuses(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ("localize", folder / "log.mcap", "--map", folder / "map.db")
     line = refused(capsys, 2, *words, "--at", 10**12)

@@ -89,6 +89,7 @@ def test_many_logs_go_into_a_folder(folder: Path, tmp_path: Path) -> None:
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.mcap", "b.mcap"]
 
 
+@pytest.mark.slow
 def test_a_map_from_the_reference(folder: Path, tmp_path: Path) -> None:
     assert call("map", folder / "a.mcap", "--from-reference", "--map", tmp_path / "truth.db") == 0
     assert call("localize", folder / "b.mcap", "--map", tmp_path / "truth.db", "-o", tmp_path / "b.mcap") == 0
@@ -103,6 +104,7 @@ def test_a_frame_above_odom_is_left_alone(folder: Path, tmp_path: Path, capsys: 
     assert "odom has a parent frame already" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("parent", "child", "written"), [("map", "wheels", False), ("wheels", "odom", True)])
 def test_the_frame_that_counts_is_that_of_the_odometry(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], parent: str, child: str, written: bool
@@ -170,6 +172,7 @@ def test_missing_and_ambiguous_inputs(folder: Path, tmp_path: Path, capsys: pyte
     assert "without odometry" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_numbers_that_are_not_finite_and_time_that_goes_back(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -70,6 +70,7 @@ def test_the_text_says_what_was_reused(here: Path, capsys: pytest.CaptureFixture
     assert f"{here / 'out.mcap'}: fuse ran: bearing_gate changed since the results in the earlier output" in said
 
 
+@pytest.mark.slow
 def test_localize_makes_the_scene_objects_that_a_log_lacks(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ("localize", here / "log.mcap", "--map", here / "map.db", "-o", here / "out.mcap")
     found = document(capsys, here, *words)

@@ -12,6 +12,7 @@ POSES = st.tuples(st.floats(-100, 100), st.floats(-100, 100), st.floats(-3.14, 3
 CLOUDS = arrays(np.float64, st.tuples(st.integers(2, 20), st.just(2)), elements=st.floats(-50, 50))
 
 
+@pytest.mark.slow
 @given(CLOUDS, POSES)
 def test_fit_undoes_any_motion(points: np.ndarray, pose: np.ndarray) -> None:
     moved = transform_points(pose, points)

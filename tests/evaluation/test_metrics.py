@@ -88,6 +88,7 @@ def test_a_perfect_estimate_has_no_error(poses: np.ndarray) -> None:
     assert (found["position"]["within_0_2_m"], found["scored"]) == (1, len(poses))
 
 
+@pytest.mark.slow
 @settings(max_examples=50)
 @given(POSES, MOTIONS, st.integers(0, 100))
 def test_alignment_makes_the_frame_of_the_estimate_irrelevant(poses: np.ndarray, motion: np.ndarray, seed: int) -> None:

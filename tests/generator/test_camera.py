@@ -115,6 +115,7 @@ def test_only_landmarks_in_reach_are_in_the_truth(scene: tuple[Staged, Renderer]
     assert all(share == 1.0 for _, share in found.values())
 
 
+@pytest.mark.slow
 def test_the_visible_share_counts_what_hides_and_what_cuts(scene: tuple[Staged, Renderer]) -> None:
     head_only = detections_from(scene, view_from(0.0, 2.0, -26.5))
     assert head_only["fire_hydrant_1"][1] == 1.0

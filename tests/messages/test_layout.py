@@ -86,6 +86,7 @@ def test_columns_are_what_rosbags_decodes(messages: list[Message]) -> None:
         check(table, [typestore().deserialize_cdr(one, ros_type) for one in data])
 
 
+@pytest.mark.slow
 @settings(max_examples=100)
 @given(MESSAGES, st.data())
 def test_cut_bytes_are_an_error_or_a_message(message: Message, data: st.DataObject) -> None:

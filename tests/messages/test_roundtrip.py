@@ -38,6 +38,7 @@ def test_decoding_undoes_encoding(message: Message) -> None:
     assert same(decode(type(message), encode(message)), message)
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(MESSAGES, st.data())
 def test_cut_bytes_are_an_error_or_a_message(message: Message, data: st.DataObject) -> None:

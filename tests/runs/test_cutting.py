@@ -175,6 +175,7 @@ def test_whole_logs_and_results_alone_carry_nothing(here: Path) -> None:
             assert "carried" not in recording.metadata[RUN]
 
 
+@pytest.mark.slow
 def test_conversion_cuts_the_same_way(here: Path) -> None:
     conversion = convert([here / "log.mcap"], here / "out.mcap", Selection((), START_NS), {}, unwatched)
     (done,) = conversion.outputs

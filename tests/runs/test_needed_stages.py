@@ -108,6 +108,7 @@ def test_where_several_are_possible_the_error_names_them_and_the_option(
     assert "nobody is no stage" in refused(capsys, 2, "localize", log, *given, "--use", "nobody")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("use", "run"),
     [

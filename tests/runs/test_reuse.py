@@ -49,6 +49,7 @@ def reasons(run: LogRun) -> dict[str, str]:
     return {stage.stage: stage.reason for stage in run.stages}
 
 
+@pytest.mark.slow
 def test_a_chain_leaves_all_channels_and_no_parts(here: Path) -> None:
     run = run_stages(asked(here), here / "out.mcap", ALL, "run")
     assert states(run) == dict.fromkeys(["cluster", "detect", "fuse", "localize"], "ran")
@@ -75,6 +76,7 @@ def test_a_second_run_reuses_everything(here: Path, monkeypatch: pytest.MonkeyPa
     assert len(looks) == 2 * COUNT
 
 
+@pytest.mark.slow
 def test_a_fusion_parameter_runs_fuse_and_what_follows(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     looks, out = counted(monkeypatch), here / "out.mcap"
     run_stages(asked(here), out, ALL, "run")
@@ -145,6 +147,7 @@ def test_another_recording_of_the_same_name_runs_anew(here: Path) -> None:
     assert topics(here / "out.mcap")[DETECTIONS.topic] == COUNT - 1
 
 
+@pytest.mark.slow
 def test_results_made_from_replaced_ones_are_left_out(here: Path) -> None:
     run_stages(asked(here), here / "a.mcap", ALL, "run")
     changed = asked(here, "a.mcap", settings={"fuse": {"bearing_gate": 4.0}})
@@ -176,6 +179,7 @@ def test_a_finished_stage_survives_a_run_that_fails(here: Path, monkeypatch: pyt
     assert not (here / ".out.mcap.parts").exists()
 
 
+@pytest.mark.slow
 def test_an_edited_output_is_not_trusted(here: Path) -> None:
     run_stages(asked(here), here / "a.mcap", FRONT, "run")
     with open_recording(here / "a.mcap") as recording, (here / "b.mcap").open("wb") as stream:
@@ -235,6 +239,7 @@ def test_results_alone_are_taken_as_they_are(here: Path) -> None:
     assert states(run) == {"localize": "ran"}
 
 
+@pytest.mark.slow
 def test_results_only_are_those_of_the_run(here: Path) -> None:
     run_stages(asked(here), here / "a.mcap", FRONT, "run")
     run_stages(asked(here, "a.mcap", results_only=True), here / "b.mcap", ["localize"], "run")

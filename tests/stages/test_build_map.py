@@ -48,6 +48,7 @@ def aligned_rmse(landmark_map: LandmarkMap, classes: tuple[str, ...], positions:
     return best
 
 
+@pytest.mark.slow
 def test_a_loop_with_repeated_classes_closes() -> None:
     classes, positions = ring()
     log = observe(drive(circle(), classes, positions, seed=1), CONFIG)

@@ -192,6 +192,7 @@ def test_a_scan_without_a_stamp_was_logged_after_its_turn() -> None:
         np.testing.assert_allclose(places(found, "fire hydrant")[0], truth, atol=0.03)
 
 
+@pytest.mark.slow
 def test_ids_follow_objects_all_around() -> None:
     velocity = np.array([0.1, 0.0, 1.0])
     found = results(drive(velocity, 7, np.random.default_rng(2)))

@@ -30,6 +30,7 @@ def test_random_boxes(seed: int) -> None:
 numbers = st.integers(0, 12)
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(numbers, numbers, numbers, numbers, numbers, st.integers(0, 1)), max_size=12))
 def test_small_grids_with_ties_and_empty_boxes(entries: list[tuple[int, ...]]) -> None:
     rows = np.array(entries, dtype=np.float32).reshape(-1, 6)
