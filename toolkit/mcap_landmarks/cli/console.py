@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from mcap_landmarks.errors import ToolkitError
 
 DONE, UNUSABLE, USAGE, PARTIAL, INTERRUPTED = 0, 1, 2, 3, 130
+"""Exit codes: 2 is also what the shell's own tools mean by wrong usage, and 130 what it gives after Ctrl-C."""
 
 
 def run_command(application: Callable[..., object], arguments: Sequence[str]) -> int:

@@ -20,6 +20,7 @@ DIFFERENT = 1
 _SHOWN, _FIELDS = 3, 8
 """So many additions, removals and fields of a channel are shown; the JSON has all."""
 _LONGEST = 60
+"""Longer texts are cut, so that a line of the table fits a terminal."""
 _HASH = re.compile("[0-9a-f]{32,}")
 
 

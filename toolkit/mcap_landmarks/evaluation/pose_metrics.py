@@ -7,6 +7,7 @@ from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array, between, rotation, transform_points
 
 FALSE_M, FALSE_DEG = 1.0, 20.0
+"""A pose that is farther off is false: beyond what a robot could drive on with."""
 Figures = dict[str, float | None]
 """Figures by name, None where there is nothing to compute them from."""
 

@@ -32,6 +32,7 @@ _LEAST_BEAMS = 3
 _MOST_SECTORS = 3
 """So many dark sectors are named, the longest: the posts of a robot are three or four."""
 _BASES = ("base_footprint", "base_link")
+"""What REP 105 and 120 call the robot's own frame."""
 
 
 @dataclass(frozen=True, slots=True)

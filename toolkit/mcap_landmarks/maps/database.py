@@ -16,6 +16,7 @@ from mcap_landmarks.maps.neighbours import Neighbours
 from mcap_landmarks.resources import resource
 
 APPLICATION_ID = 0x4D434C4D
+"""Tells our SQLite files from others: the letters MCLM."""
 SCHEMA_VERSION = 1
 _NUMBERS = ("x_m", "y_m", "var_x_m2", "cov_xy_m2", "var_y_m2", "radius_m")
 _COLUMNS = [("number", "i8"), ("id", "O"), ("class", "O"), *((name, "f8") for name in _NUMBERS)]

@@ -10,6 +10,7 @@ from mcap_landmarks.messages.annotations import Color
 from mcap_landmarks.messages.markers import Marker, MarkerArray, MarkerShape
 
 _HEIGHT_M, _SMALLEST_M, _LETTERS_M = 0.6, 0.1, 0.35
+"""Height and least diameter of a cylinder, and size of its label: to be seen from the height of a whole map."""
 
 
 def class_color(name: str) -> Color:

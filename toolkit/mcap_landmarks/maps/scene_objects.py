@@ -12,6 +12,7 @@ from mcap_landmarks.messages.scene import SceneObjects
 
 # Two objects of one class stand farther apart than this.
 _SAME_PLACE_M = 0.05
+# No position is known better than to a tenth of a millimetre; a smaller sigma would make a fit singular.
 _LEAST_M = 1e-4
 
 

@@ -13,6 +13,7 @@ from mcap_landmarks.report.explain_reading import SensorData
 _GREY, _OBJECT, _CLUSTER, _BOX = "#9CA3AF", "#D55E00", "#0072B2", "#FACC15"
 _PLACES = ("#111827", "#7E22CE", "#047857", "#B45309", "#1D4ED8")
 _AROUND_M = 6.0
+"""So far around the landmarks of the candidates the map is drawn: enough to show what stands beside them."""
 
 
 def explanation_figure(situation: Situation, places: tuple[Place, ...], view: SensorData, title: str = "") -> Figure:

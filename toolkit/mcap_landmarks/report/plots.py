@@ -28,6 +28,7 @@ _RUNS = ("#111827", "#1D4ED8", "#B45309", "#047857", "#7E22CE")
 _RADII_95 = 2.4477
 """An ellipse of so many sigmas holds 95 % of a normal distribution of the plane."""
 _MOST_LABELS = 60
+"""Of more landmarks the labels would cover each other at the size of a page."""
 
 
 def form_of(path: Location) -> str:

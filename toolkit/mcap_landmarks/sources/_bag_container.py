@@ -10,6 +10,7 @@ import lz4.frame
 
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
+"""The operations of records, as the rosbag format 2.0 numbers them (wiki.ros.org/Bags/Format/2.0)."""
 LARGEST_CHUNK = 1 << 30
 """A chunk that claims to be larger than this is taken for damage, and not allocated."""
 
@@ -19,6 +20,7 @@ _COUNT = struct.Struct("<II")
 _INDEX_ENTRY = struct.Struct("<III")
 _OP_FIELD, _CONN_FIELD, _TIME_FIELD = b"\x04\0\0\0op=\x02", b"\x09\0\0\0conn=", b"\x0d\0\0\0time="
 _MESSAGE_HEADER = 8 + 13 + 17
+"""Bytes of the usual header: the fields op, conn and time, each with its length before it."""
 Header = dict[bytes, bytes]
 
 

@@ -18,7 +18,9 @@ from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessag
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _REPORT_BYTES = 1 << 20
+"""Progress is told each time that so much was read."""
 _FIRST, _LAST = -(2**63), 2**63 - 1
+"""The limits of SQLite's integers."""
 _Row = tuple[int, int, int, bytes]  # time, row id, topic id, data
 _Key = tuple[int, int]  # time, row id
 

@@ -7,6 +7,7 @@ from mcap_landmarks.stage import RawMessage
 
 Piece = tuple[int, Callable[[], Iterable[RawMessage]]]
 _END = 2**64
+"""After every log time that there can be: MCAP's have 64 bits without a sign."""
 
 
 def merge(pieces: Iterable[Piece]) -> Iterator[RawMessage]:

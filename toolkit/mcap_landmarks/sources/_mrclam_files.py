@@ -16,6 +16,7 @@ from mcap_landmarks.errors import RecordingError
 
 _ROBOT = re.compile(r"Robot(\d+)_(Odometry|Measurement|Groundtruth)\.dat")
 _COLUMNS = {"Odometry": 3, "Measurement": 4, "Groundtruth": 4}
+"""How many columns a table has, the time among them, as the data set's page says (Leung et al. 2011)."""
 Array = NDArray[np.float64]
 
 
