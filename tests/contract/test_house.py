@@ -72,8 +72,7 @@ def complexities(path: Path) -> Iterator[tuple[str, int]]:
 
 def test_functions_have_few_ways_through() -> None:
     found = {f"{name_of(path)} {name}": ways for path in FILES for name, ways in complexities(path)}
-    over = {name: ways for name, ways in found.items() if ways > MOST_COMPLEXITY}
-    assert over == {}
+    assert {name: ways for name, ways in found.items() if ways > MOST_COMPLEXITY} == {}
 
 
 def test_every_file_says_what_it_is_for() -> None:
@@ -106,5 +105,4 @@ def test_a_class_name_means_one_thing() -> None:
         for node in ast.walk(tree_of(path)):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].append(name_of(path))
-    twice = {name: sorted(found) for name, found in places.items() if len(found) > 1}
-    assert twice == {}
+    assert {name: sorted(found) for name, found in places.items() if len(found) > 1} == {}

@@ -23,7 +23,7 @@ TOY = '''
 """Boxes with their score and class, as shares of an image that is stretched; NMS is done."""
 
 import numpy as np
-from mcap_landmarks.vision.family import DecodedBoxes, Family, ModelLayout
+from mcap_landmarks.vision.family import DetectionCandidates, Family, ModelLayout
 from mcap_landmarks.vision.letterbox import Colours, Letterbox
 from mcap_landmarks.vision.onnx_session import fits
 
@@ -36,7 +36,7 @@ class Ended(ModelLayout):
         rows = outputs[0][0].astype(np.float32)
         classes = rows[:, 5].astype(np.intp)
         rows, classes = (part[rows[:, 4] > thresholds[classes]] for part in (rows, classes))
-        return DecodedBoxes(rows[:, :4] * np.array(input_px[::-1] * 2, np.float32), rows[:, 4], classes)
+        return DetectionCandidates(rows[:, :4] * np.array(input_px[::-1] * 2, np.float32), rows[:, 4], classes)
 
 
 def recognise(signature):

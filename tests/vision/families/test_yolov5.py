@@ -11,7 +11,7 @@ from mcap_landmarks.errors import ModelError
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.detector import Detector, read_detector
 from mcap_landmarks.vision.families.yolov5 import ANCHORS, AnchorLayout, Form, strides
-from mcap_landmarks.vision.family import DecodedBoxes
+from mcap_landmarks.vision.family import DetectionCandidates
 from mcap_landmarks.vision.letterbox import Colours, fit, fitted_input, tensor
 from mcap_landmarks.vision.nms import suppress
 from mcap_landmarks.vision.onnx_session import open_session
@@ -49,7 +49,7 @@ def noise(shape: tuple[int, ...], seed: int) -> NDArray[np.float32]:
     return np.random.default_rng(seed).random(shape, dtype=np.float32)
 
 
-def kept_rows(found: DecodedBoxes, iou: float = 0.45) -> NDArray[np.float32]:
+def kept_rows(found: DetectionCandidates, iou: float = 0.45) -> NDArray[np.float32]:
     kept = found.take(suppress(found.boxes_xyxy, found.scores, found.class_ids, iou, 300))
     return np.column_stack([kept.boxes_xyxy, kept.scores, kept.class_ids])
 

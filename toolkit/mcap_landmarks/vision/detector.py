@@ -11,7 +11,7 @@ from mcap_landmarks.errors import ModelError, UsageError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.families import family_names, find_family
-from mcap_landmarks.vision.family import DecodedBoxes, Family, ModelLayout, Signature
+from mcap_landmarks.vision.family import DetectionCandidates, Family, ModelLayout, Signature
 from mcap_landmarks.vision.metadata import confidence_of, names_of
 from mcap_landmarks.vision.onnx_session import FLOATS, OnnxSession, fits, written
 
@@ -49,7 +49,7 @@ class Detector:
 
     def candidates(
         self, outputs: list[NDArray[Any]], input_px: tuple[int, int], thresholds: NDArray[np.float32]
-    ) -> DecodedBoxes:
+    ) -> DetectionCandidates:
         """The boxes in the outputs for an input (height, width), above the threshold of their class (classes,).
 
         Raises:

@@ -15,16 +15,16 @@ from mcap_landmarks.vision.onnx_session import Shape, Tensor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class DecodedBoxes:
+class DetectionCandidates:
     """N boxes in pixels of the input: boxes_xyxy (N, 4), scores (N,), class_ids (N,)."""
 
     boxes_xyxy: Boxes
     scores: NDArray[np.float32]
     class_ids: NDArray[np.intp]
 
-    def take(self, indices: NDArray[Any]) -> "DecodedBoxes":
+    def take(self, indices: NDArray[Any]) -> "DetectionCandidates":
         """Some of the boxes."""
-        return DecodedBoxes(self.boxes_xyxy[indices], self.scores[indices], self.class_ids[indices])
+        return DetectionCandidates(self.boxes_xyxy[indices], self.scores[indices], self.class_ids[indices])
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ class ModelLayout(ABC):
     @abstractmethod
     def decode(
         self, outputs: Sequence[NDArray[Any]], input_px: tuple[int, int], thresholds: NDArray[np.float32]
-    ) -> DecodedBoxes:
+    ) -> DetectionCandidates:
         """The boxes whose score is above the threshold of their class (classes,), of outputs of the said shapes.
 
         Boxes and scores that are not finite are left out.

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import ModelError
-from mcap_landmarks.vision.family import DecodedBoxes, Family, ModelLayout, Signature
+from mcap_landmarks.vision.family import DetectionCandidates, Family, ModelLayout, Signature
 from mcap_landmarks.vision.onnx_session import FLOATS, Shape, Tensor, fits, written
 
 Anchors = NDArray[np.float32]
@@ -47,7 +47,7 @@ class AnchorLayout(ModelLayout):
 
     def decode(
         self, outputs: Sequence[NDArray[Any]], input_px: tuple[int, int], thresholds: NDArray[np.float32]
-    ) -> DecodedBoxes:
+    ) -> DetectionCandidates:
         """See `ModelLayout`; a score is objectness times probability. In the order of the network's cells."""
         del input_px
         lowest = float(thresholds.min())
@@ -125,7 +125,7 @@ def head_rows(raw: NDArray[Any], stride_px: int, anchors: Anchors, lowest: float
     return rows
 
 
-def scored(rows: NDArray[np.float32], thresholds: NDArray[np.float32]) -> DecodedBoxes:
+def scored(rows: NDArray[np.float32], thresholds: NDArray[np.float32]) -> DetectionCandidates:
     """Candidates of rows (N, 5 + classes): centre, size, objectness, class probabilities."""
     class_ids = rows[:, 5:].argmax(axis=1)
     with np.errstate(invalid="ignore", over="ignore"):  # a broken network's numbers are sorted out below
@@ -133,7 +133,7 @@ def scored(rows: NDArray[np.float32], thresholds: NDArray[np.float32]) -> Decode
     good = (scores > thresholds[class_ids]) & np.isfinite(rows[:, :4]).all(axis=1) & np.isfinite(scores)
     centres, halves = rows[good, 0:2], rows[good, 2:4] / 2
     boxes = np.concatenate([centres - halves, centres + halves], axis=1)
-    return DecodedBoxes(boxes, scores[good], class_ids[good])
+    return DetectionCandidates(boxes, scores[good], class_ids[good])
 
 
 def _sigmoid(values: NDArray[np.float32]) -> NDArray[np.float32]:
