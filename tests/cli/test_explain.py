@@ -141,7 +141,7 @@ def agrees(log: Path, capsys: pytest.CaptureFixture[str], every: int = 1) -> set
 def test_the_explanation_is_what_localize_decided(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert agrees(GOLDEN, capsys, every=8) == {"localized"}
     world = unique_classes()
-    seen = bundles(*world, count=24)
+    seen = bundles(*world)
     results = localized(tmp_path, *world, seen, LocalizeConfig(max_sigma_m=0.03, max_sigma_deg=0.3))
     log = write_log(tmp_path / "unique.mcap", seen, results)
     assert agrees(log, capsys) == {"localized", "too_few_objects", "inconsistent", "weak_geometry"}

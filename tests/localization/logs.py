@@ -24,7 +24,7 @@ def unique_classes() -> tuple[tuple[str, ...], np.ndarray]:
     return tuple(f"tag {i}" for i in range(len(positions))), positions
 
 
-def bundles(classes: tuple[str, ...], positions: np.ndarray, count: int = 36) -> list[Bundle]:
+def bundles(classes: tuple[str, ...], positions: np.ndarray, count: int = 24) -> list[Bundle]:
     """A drive around a ring; every sixth bundle has one object, every sixth an object in a wrong place."""
     found = []
     for i, bundle in enumerate(drive(circle(count=count), classes, positions, seed=2)):

@@ -38,7 +38,7 @@ def views(world: World, count: int, seed: int) -> list[tuple[SceneObjects, np.nd
 
 def test_appendix_c_from_any_side() -> None:
     world = appendix_c(np.random.default_rng(0))
-    seen = views(world, 300, seed=1)
+    seen = views(world, 200, seed=1)
     found = matcher_of(world).match([observed for observed, _ in seen])
     right = wrong = 0
     for match, (_, pose) in zip(found, seen, strict=True):
@@ -47,17 +47,15 @@ def test_appendix_c_from_any_side() -> None:
             right += far < 0.5 and turned < 5
             wrong += far > 1 or turned > 20
     assert wrong == 0
-    assert right > 0.9 * len(seen)
+    assert right > 0.99 * len(seen)
 
 
 def test_unknown_places_are_refused() -> None:
     here = random_world(np.random.default_rng(2), 50)
     elsewhere = random_world(np.random.default_rng(3), 50)
-    found = matcher_of(here).match([observed for observed, _ in views(elsewhere, 400, seed=4)])
-    assert sum(match.message.status == Status.LOCALIZED for match in found) <= 1
-    refused = [match.message for match in found if match.pose is None]
-    assert {message.status for message in refused} <= {Status.AMBIGUOUS, Status.NO_MATCH}
-    assert all(message.expected_accidental > LocalizeConfig().accidental for message in refused)
+    found = matcher_of(here).match([observed for observed, _ in views(elsewhere, 200, seed=4)])
+    assert {match.message.status for match in found} == {Status.NO_MATCH}
+    assert all(match.message.expected_accidental > LocalizeConfig().accidental for match in found)
 
 
 def stretch(world: World, seed: int, scale: float = 1.0) -> tuple[list[Match], list[np.ndarray]]:
@@ -144,4 +142,4 @@ def test_objects_in_one_place_or_exactly_in_line(third: tuple[float, float]) -> 
     spread = np.tile(0.02**2 * np.eye(2), (3, 1, 1))
     seen = SceneObjects(0, "base", ("a", "b", "c"), options, points, spread, np.zeros(3))
     found = matcher_of(appendix_c(np.random.default_rng(13))).match([seen])[0]
-    assert found.message.status in (Status.AMBIGUOUS, Status.NO_MATCH)
+    assert found.message.status is Status.NO_MATCH

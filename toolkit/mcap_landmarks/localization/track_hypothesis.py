@@ -134,7 +134,7 @@ class TrackHypothesis:
     def _inflated(self, objects: Objects, landmarks: Ints) -> Objects:
         """The objects with the errors of each observation of the same landmark taken for the same.
 
-        n such observations together then weigh like one, as a bias that is the same in all of them would have it.
+        The n-th of them then adds an n-th of what the first did, so that looking longer helps only so far.
         """
         factor = self.evidence.effective_of(landmarks)
         return replace(objects, covariances=objects.covariances * factor[:, None, None])
