@@ -5,7 +5,7 @@ from mcap_landmarks.geometry.se2 import Array, inverse, transform_points
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.localization.index import MapIndex
 from mcap_landmarks.localization.matching import Matcher
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import OdometryAt
 from numpy.typing import ArrayLike
@@ -19,7 +19,7 @@ PLACE_CLASSES = ("bench", "person", "person", "hydrant", "bench")
 def landmark_map(positions_xy: ArrayLike, classes: tuple[str, ...]) -> LandmarkMap:
     """A surveyed map, landmarks l0, l1 and so on, whose covariances are unknown."""
     names = tuple(f"l{i}" for i in range(len(classes)))
-    return LandmarkMap.surveyed(names, classes, np.asarray(positions_xy), Source("import", "test"))
+    return LandmarkMap.surveyed(names, classes, np.asarray(positions_xy), MapSource("import", "test"))
 
 
 def elsewhere(count: int = 24, seed: int = 1) -> tuple[Array, tuple[str, ...]]:
