@@ -24,6 +24,7 @@ def solver(capsys: pytest.CaptureFixture[str]) -> tuple[Any, str]:
     return document.get("solver"), told.err
 
 
+@pytest.mark.slow
 def test_how_the_solver_ended_is_told_and_kept(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ("map", log, "--map", tmp_path / "a.db", "--json")
     assert call(*words) == 0
@@ -38,6 +39,7 @@ def test_how_the_solver_ended_is_told_and_kept(log: Path, tmp_path: Path, capsys
     assert again == found
 
 
+@pytest.mark.slow
 def test_the_last_iteration_that_was_allowed_is_noted(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -51,6 +53,7 @@ def test_the_last_iteration_that_was_allowed_is_noted(
         assert f"b.db: a solution needed the last of {free['iterations']} iterations" in notes
 
 
+@pytest.mark.slow
 def test_a_map_that_did_not_converge_is_refused_with_what_to_try(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

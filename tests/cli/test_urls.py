@@ -91,6 +91,7 @@ def _types(parameter: inspect.Parameter) -> tuple[object, ...]:
     return (written, *get_args(written))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("verb", "name"), EACH)
 def test_a_url_is_refused_as_it_was_written(
     verb: str, name: str, files: Mapping[str, Path], capsys: pytest.CaptureFixture[str]

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
 from radon.complexity import cc_visit
 from radon.visitors import Class
 
@@ -70,6 +71,7 @@ def complexities(path: Path) -> Iterator[tuple[str, int]]:
             yield block.fullname, block.complexity
 
 
+@pytest.mark.slow
 def test_functions_have_few_ways_through() -> None:
     found = {f"{name_of(path)} {name}": ways for path in FILES for name, ways in complexities(path)}
     assert {name: ways for name, ways in found.items() if ways > MOST_COMPLEXITY} == {}

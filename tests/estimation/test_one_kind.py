@@ -19,6 +19,7 @@ def far_from_a_line(points: Array) -> bool:
     return bool(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1] > 2)
 
 
+@pytest.mark.slow
 @given(landmarks=places, position=st.tuples(coordinate, coordinate).map(np.array))
 @settings(deadline=None, derandomize=True)
 def test_exact_ranges_give_the_position(landmarks: Array, position: Array) -> None:

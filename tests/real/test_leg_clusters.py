@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.lidar.beams import echoes, sweep
 from mcap_landmarks.lidar.config import ClusterConfig
@@ -11,6 +12,8 @@ from mcap_landmarks.lidar.segments import Breaks, extent_m, near_clusters, point
 from rosbags.rosbag1 import Reader
 from rosbags.typesys import Stores, get_typestore
 from scipy.optimize import linear_sum_assignment
+
+pytestmark = pytest.mark.slow
 
 LARGEST_LEGS_M = 0.35
 NEAR_M = 0.05

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from mcap_landmarks.config import stage_config
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.detection import input_size, thresholds
@@ -13,6 +14,7 @@ from mcap_landmarks.vision.onnx_session import open_session
 from tests.vision.networks import Export, yolov5
 
 
+@pytest.mark.slow
 def test_input_sizes(tmp_path: Path) -> None:
     def size(sides: tuple[Any, Any], image: tuple[int, int], **settings: object) -> tuple[int, int]:
         yolov5(tmp_path / "m.onnx", ["a"], export=Export(*sides))

@@ -25,6 +25,7 @@ def _hits(asset: Asset, height_m: float) -> tuple[np.ndarray, np.ndarray]:
     return np.abs(asset.section.signed_distance_m(ends)), hit
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "variant"), UPRIGHT)
 @pytest.mark.parametrize("seed", [0, 10_003])
 def test_rays_end_on_the_declared_outline(name: str, variant: str, seed: int) -> None:
