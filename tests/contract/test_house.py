@@ -84,8 +84,8 @@ def test_every_file_says_what_it_is_for() -> None:
 def test_types_are_said() -> None:
     """`Any` only where no type can be: four times in a thousand lines, counted as words, imports included."""
     found = {name_of(path): len(re.findall(r"\bAny\b", text_of(path))) for path in FILES}
-    most = MOST_ANY * sum(lines_of(path) for path in FILES)
-    assert sum(found.values()) <= most, sorted(((count, name) for name, count in found.items() if count), reverse=True)
+    share = sum(found.values()) / sum(lines_of(path) for path in FILES)
+    assert share <= MOST_ANY, sorted(((count, name) for name, count in found.items() if count), reverse=True)
 
 
 def test_a_file_name_means_one_thing() -> None:
@@ -95,7 +95,8 @@ def test_a_file_name_means_one_thing() -> None:
     verbs = {path.stem for folder in ("cli", "stages") for path in (TOOLKIT / folder).glob("*.py")}
     places = defaultdict(set)
     for path in TOOLKIT.rglob("*.py"):
-        if path.stem not in {"__init__", *SAME_MEANING} and path.parent.name != "messages":
+        of_messages = path.parent.name == "messages" and "ROS_TYPE: ClassVar" in text_of(path)
+        if path.stem not in {"__init__", *SAME_MEANING} and not of_messages:
             of_the_verb = path.stem in verbs and path.parent.name in FOLDERS_OF_VERBS
             places[path.stem].add("of the verb" if of_the_verb else name_of(path))
     assert {stem: sorted(found) for stem, found in places.items() if len(found) > 1} == {}
