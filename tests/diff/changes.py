@@ -12,7 +12,7 @@ from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.stage import Channel
 from numpy.typing import ArrayLike
 
-from tests.evaluation.runs import BUNDLES, FOREIGN, START_NS, STATUS, Row, Run, with_row, without
+from tests.evaluation.runs import ACCIDENTAL, BUNDLES, FOREIGN, START_NS, STATUS, Row, Run, with_row, without
 
 DETECTION = ("ids", "hypotheses", "boxes_xyxy")
 OBJECT = ("ids", "hypotheses", "positions_xy", "covariances", "radii_m")
@@ -81,6 +81,15 @@ CHANGES = {
     "landmark": (
         edit(channels.MATCH, lambda m: with_row(m, "landmark_ids", 0, "l9")), channels.MATCH, (1, 0, 0),
         {"landmark_ids"}),
+    "accidents": (
+        edit(channels.MATCH, replace(expected_accidental=1.001 * ACCIDENTAL)), channels.MATCH, (1, 0, 0),
+        {"expected_accidental"}),
+    "condition": (
+        edit(channels.MATCH, lambda m: with_row(m, "conditions", 0, m.conditions[0]._replace(value=1.0, held=False))),
+        channels.MATCH, (1, 0, 0), {"condition_values", "condition_held"}),
+    "limit": (
+        edit(channels.MATCH, lambda m: with_row(m, "conditions", 1, m.conditions[1]._replace(limit=2.1e-3))),
+        channels.MATCH, (1, 0, 0), {"condition_limits"}),
     "position": (edit(channels.POSE, shifted("position_m", 0, 0.2)), channels.POSE, (1, 0, 0), {"position_m"}),
     "no number": (edit(channels.POSE, shifted("position_m", 0, np.nan)), channels.POSE, (1, 0, 0), {"position_m"}),
     "heading": (
@@ -130,6 +139,7 @@ SAME = {
         lambda m: dataclasses.replace(m, hypotheses=m.hypotheses[::-1], boxes_xyxy=m.boxes_xyxy[::-1]),
     ),
     "rounding of a box": edit(channels.DETECTIONS, shifted("boxes_xyxy", 1, 0.25)),
+    "rounding of odds": edit(channels.MATCH, replace(expected_accidental=(1 + 1e-5) * ACCIDENTAL)),
     "rounding of a position": edit(channels.POSE, shifted("position_m", 0, 5e-7)),
     "other names of tracks": lambda run: [
         run.edit("/landmarks/scene_objects", replace(ids=("a", "b", "c", "d")), i) for i in range(BUNDLES)

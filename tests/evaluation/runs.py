@@ -15,7 +15,7 @@ from mcap_landmarks.messages.codec import M, Message
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CompressedImage
 from mcap_landmarks.messages.markers import Marker, MarkerArray, MarkerShape
-from mcap_landmarks.messages.match import LandmarkMatch, Status
+from mcap_landmarks.messages.match import Condition, LandmarkMatch, Status
 from mcap_landmarks.messages.numbers import UInt8
 from mcap_landmarks.messages.poses import Odometry, PoseStamped, PoseWithCovarianceStamped
 from mcap_landmarks.messages.poses import Path as PosePath
@@ -26,6 +26,8 @@ from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.stage import Channel, Connection, RawMessage, Stamped
 
 START_NS, STEP_NS, BUNDLES = 1_700_000_000 * 10**9, 10**8, 6
+# Accidental matches expected of a good match: seldom as many as this.
+ACCIDENTAL = 1.5e-15
 STATUS = Channel("/status", UInt8)
 FOREIGN = Connection("/foreign", "odd/msg/Thing", b"{}", "jsonschema", "json")
 Row = int | tuple[int, ...]
@@ -105,7 +107,17 @@ def _bundle(rng: np.random.Generator, i: int, time_ns: int) -> list[Entry]:
     outlines = tuple(Outline(np.repeat(box.reshape(2, 2), 2, axis=0), color, 2.0) for box in boxes)
     text = Label((1.0, 2.0), "person", 12.0, color, color)
     scan = LaserScan(time_ns, "base_scan", -np.pi, np.pi, 0.157, 0.0, 0.1, 0.1, 15.0, ranges, np.zeros(0, np.float32))
-    matched = ("t0", "t1"), ("l4", "l7"), np.array([0.01, 0.02])
+    asked = (Condition("objects", 4, 2, held=True), Condition("expected_accidental", ACCIDENTAL, 2e-3, held=True))
+    match = LandmarkMatch(
+        time_ns,
+        "base_footprint",
+        Status.LOCALIZED,
+        ("t0", "t1"),
+        ("l4", "l7"),
+        np.array([0.01, 0.02]),
+        expected_accidental=ACCIDENTAL,
+        conditions=asked,
+    )
     return [
         (channels.CAMERA_IMAGE, time_ns, CompressedImage(time_ns, "camera", "jpeg", rng.bytes(64))),
         (channels.SCAN, time_ns, scan),
@@ -113,7 +125,7 @@ def _bundle(rng: np.random.Generator, i: int, time_ns: int) -> list[Entry]:
         (channels.DETECTIONS, time_ns, Detections(time_ns, "camera", ("", "", ""), labels, boxes)),
         (channels.ANNOTATIONS, time_ns, ImageAnnotations(time_ns, outlines, (text,))),
         (channels.SCENE_OBJECTS, time_ns, objects(rng, time_ns, "base_footprint", 4)),
-        (channels.MATCH, time_ns, LandmarkMatch(time_ns, "base_footprint", Status.LOCALIZED, *matched)),
+        (channels.MATCH, time_ns, match),
         (channels.POSE, time_ns, PoseStamped.planar(time_ns, "map", pose)),
         (channels.POSE_COVARIANCE, time_ns, PoseWithCovarianceStamped.planar(time_ns, "map", pose, spread)),
         (channels.TF, time_ns, TFMessage((Transform.planar(time_ns, ("map", "odom"), pose),))),

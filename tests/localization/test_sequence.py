@@ -13,7 +13,7 @@ from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.messages.match import Status
 from mcap_landmarks.messages.scene import SceneObjects
 
-from tests.localization.small_worlds import SIGMA_M, matcher, odometry, one_place, seen, two_places
+from tests.localization.small_worlds import matcher, odometry, one_place, seen, two_places
 
 POSE = np.array([-4.0, 1.0, 0.1])
 UNKNOWN_XY = np.array([[3.0, 8.0], [5.0, -7.0], [1.0, -9.0]])
@@ -38,39 +38,6 @@ def ahead(count: int) -> Array:
 
 def statuses(found: list[Match]) -> list[Status]:
     return [match.message.status for match in found]
-
-
-def test_a_single_bundle_of_one_of_two_identical_places_is_ambiguous() -> None:
-    """However many objects agree with one place: they agree with the other one as well."""
-    world = two_places()
-    for count in (3, 4, 5):
-        match = matcher(world).match([seen(world, POSE, range(count))])[0]
-        assert match.message.status is Status.AMBIGUOUS
-        assert match.pose is None
-        assert match.message.expected_accidental == pytest.approx(1.0, abs=1e-3)
-        assert match.message.candidate_scores == pytest.approx([0.5, 0.5], abs=1e-3)
-        first, second = ("+".join(f"l{i + start}" for i in range(count)) for start in (0, 5))
-        assert set(match.message.candidate_ids) == {first, second}
-
-
-def test_a_single_bundle_of_a_place_that_is_there_once_is_localized() -> None:
-    world = one_place()
-    match = matcher(world).match([seen(world, POSE, range(5))])[0]
-    assert match.message.status is Status.LOCALIZED
-    assert match.pose == pytest.approx(POSE, abs=1e-9)
-    assert match.message.landmark_ids == ("l0", "l1", "l2", "l3", "l4")
-    assert match.message.residual_m == pytest.approx(np.zeros(5), abs=1e-9)
-
-
-def test_a_lucky_fit_is_no_surer_than_an_average_one() -> None:
-    """Without any error the match is as likely an accident as with the errors that are to be expected."""
-    world, rng = one_place(), np.random.default_rng(0)
-    noise = rng.normal(size=(5, 2))
-    found = matcher(world).match([seen(world, POSE, range(5), s * SIGMA_M * noise) for s in (0.0, 0.5, 1.5)])
-    lucky, better, average = (match.message for match in found)
-    assert lucky.chi2 < 1e-9 < better.chi2 < average.chi2 < average.dof
-    assert lucky.expected_accidental == pytest.approx(average.expected_accidental, rel=0.1)
-    assert lucky.expected_accidental == pytest.approx(better.expected_accidental, rel=0.1)
 
 
 def test_a_sequence_past_one_of_two_identical_places_stays_ambiguous_until_something_tells_them_apart() -> None:
