@@ -39,9 +39,10 @@ from mcap_landmarks.stage import Bundle, InputLog, LeftOut, OdometryAt, Omission
 
 # Bundles that are solved together, or calibrated from; a sequence takes them one by one.
 _BATCH, _SEQUENCE = 4096, 64
-# Odds are the exponential of a sum of logarithms in the tens to hundreds, which two machines round differently in the
-# tenth digit or so. They are worth telling apart however small they are; the floor is that of `Evidence.odds_against`.
-_ODDS = Tolerance(1e-300, 1e-4)
+# Odds are the exponential of a sum of squares over sigmas, and so a thousandth apart where objects are a micrometre apart
+# (some ten of them, with sigmas of a centimetre). They are worth telling apart however small they are: the floor is that
+# of `Evidence.odds_against`.
+_ODDS = Tolerance(1e-300, 1e-3)
 _NO_FRAME = "transforms from the map to odometry that were not written, as odometry names no frame of its own"
 
 Locate = Callable[[Sequence[SceneObjects], Sequence[OdometryAt | None]], list[Match]]
@@ -149,7 +150,7 @@ STAGE = Stage(
         "candidate_scores": Tolerance(1e-6, 1e-6),
         "expected_accidental": _ODDS,
         "chi2": Tolerance(1e-6, 1e-6),
-        "condition_values": Tolerance(1e-6, 1e-6),  # the odds among them are compared above
+        "condition_values": Tolerance(1e-6, _ODDS.relative),  # small odds have a field of their own
         "condition_limits": Tolerance(0.0, 1e-9),
     },
 )
