@@ -23,7 +23,7 @@ poses = st.tuples(coordinate, coordinate, st.floats(-3.1, 3.1)).map(np.array)
 
 
 @given(pose=poses, landmarks=st.lists(st.tuples(coordinate, coordinate), min_size=2, max_size=6, unique=True))
-@settings(deadline=None, derandomize=True)
+@settings(max_examples=40)
 def test_without_noise_the_pose_is_exact(pose: Array, landmarks: list[tuple[float, float]]) -> None:
     xy = np.array(landmarks)
     spread = np.linalg.norm(xy - xy.mean(axis=0), axis=1).max()
@@ -39,7 +39,7 @@ def test_without_noise_the_pose_is_exact(pose: Array, landmarks: list[tuple[floa
 
 
 @given(move=poses)
-@settings(deadline=None, derandomize=True)
+@settings(max_examples=40)
 def test_moving_the_map_moves_the_pose_and_turns_its_covariance(move: Array) -> None:
     world = thesis_like(1, 4, 0.05, 0.01, seed=5)
     here = solve_poses(world.landmarks_xy, world.range_m, world.bearing_rad, world.covariance)
@@ -55,20 +55,20 @@ def test_moving_the_map_moves_the_pose_and_turns_its_covariance(move: Array) -> 
 @pytest.mark.parametrize("sigma_range_m", [0.01, 0.05])
 @pytest.mark.parametrize("sigma_bearing_deg", [0.1, 0.3])
 def test_reaches_the_cramer_rao_bound_and_says_so(sigma_range_m: float, sigma_bearing_deg: float) -> None:
-    world = thesis_like(20_000, 3, sigma_range_m, np.radians(sigma_bearing_deg), seed=1)
+    world = thesis_like(10_000, 3, sigma_range_m, np.radians(sigma_bearing_deg), seed=1)
     solved = solve_poses(world.landmarks_xy, world.range_m, world.bearing_rad, world.covariance)
     assert solved.converged.all()
     errors = pose_errors(solved.map_from_base, world.poses)
     bound = world.crb()
     ratio = np.sqrt((errors[:, :2] ** 2).sum(axis=1).mean() / np.trace(bound[:, :2, :2], axis1=1, axis2=2).mean())
-    assert ratio <= 1.02
+    assert ratio == pytest.approx(1, abs=0.02)
     assert 0.95 <= nees(errors, solved.covariance) <= 1.05
     assert solved.chi2.mean() / solved.dof.mean() == pytest.approx(1, abs=0.03)
 
 
 @pytest.mark.parametrize("seen", [3, 5, 10])
 def test_robust_weights_keep_the_covariance_honest(seen: int) -> None:
-    world = thesis_like(10_000, seen, 0.02, np.radians(0.3), seed=2)
+    world = thesis_like(4_000, seen, 0.02, np.radians(0.3), seed=2)
     solved = solve_poses(world.landmarks_xy, world.range_m, world.bearing_rad, world.covariance, robust_dof=3)
     assert solved.converged.mean() > 0.999
     errors = pose_errors(solved.map_from_base, world.poses)[solved.converged]
@@ -90,7 +90,7 @@ def test_robust_weights_shrug_off_a_wrong_range() -> None:
 
 
 def test_the_maps_own_covariance_is_part_of_the_poses() -> None:
-    world = thesis_like(20_000, 4, 0.02, np.radians(0.3), seed=4)
+    world = thesis_like(4_000, 4, 0.02, np.radians(0.3), seed=4)
     spread = np.array([[0.04, 0.02], [0.02, 0.02]])
     drawn = np.random.default_rng(4).multivariate_normal([0, 0], spread, world.range_m.shape)
     solved = solve_poses(
