@@ -8,6 +8,7 @@ import numpy as np
 from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, SCAN_OBJECTS, SCENE_OBJECTS, TF_STATIC
 from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.fusion.config import FuseConfig
+from mcap_landmarks.fusion.tracks import TrackTable
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.geometry.se2 import Array, exp, inverse, transform_points
@@ -138,6 +139,18 @@ def moved(things: Sequence[Thing], velocity: Sequence[float], time_s: float) -> 
     step = inverse(exp(np.asarray(velocity) * time_s))
     places = [transform_points(step, np.array([thing.x, thing.y])).tolist() for thing in things]
     return [Thing(thing.name, x, y) for thing, (x, y) in zip(things, places, strict=True)]
+
+
+def tracked(objects: ScanObjects, config: FuseConfig | None = None) -> TrackTable:
+    """Tracks of a first scan's objects, of which nothing is known yet."""
+    table = TrackTable(config or FuseConfig())
+    table.see(objects, alone=False)
+    return table
+
+
+def believe(table: TrackTable, track: str, name: str, share: float = 0.99) -> None:
+    """Make a track believe that it is of a class."""
+    table[track].belief.log_odds = {name: float(np.log(share / (1 - share)))}
 
 
 def fused(
