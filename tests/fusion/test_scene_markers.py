@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from mcap_landmarks.fusion.scene_markers import markers_from_scene
-from mcap_landmarks.maps.markers import class_color
-from mcap_landmarks.messages.markers import Shape
+from mcap_landmarks.maps.map_markers import class_color
+from mcap_landmarks.messages.markers import MarkerShape
 from mcap_landmarks.messages.scene import SceneObjects
 
 SCENE = SceneObjects(
@@ -22,7 +22,7 @@ def test_an_object_is_a_cylinder_and_a_label_above_it() -> None:
     drawn = markers_from_scene(SCENE)
     assert (drawn.stamp_ns, drawn.frame_id, drawn.replaces) == (7, "base_footprint", True)
     body, label, *_ = drawn.markers
-    assert (body.shape, label.shape) == (Shape.CYLINDER, Shape.TEXT_VIEW_FACING)
+    assert (body.shape, label.shape) == (MarkerShape.CYLINDER, MarkerShape.TEXT_VIEW_FACING)
     np.testing.assert_allclose(body.position_m, [5.0, 1.0, 0.25])
     np.testing.assert_allclose(body.size_m, [0.5, 0.5, 0.5])
     np.testing.assert_allclose(label.position_m, [5.0, 1.0, 0.75])

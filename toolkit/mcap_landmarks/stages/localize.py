@@ -39,9 +39,9 @@ from mcap_landmarks.stage import Bundle, InputLog, LeftOut, OdometryAt, Omission
 
 # Bundles that are solved together, or calibrated from; a sequence takes them one by one.
 _BATCH, _SEQUENCE = 4096, 64
-# Odds are the exponential of a sum of squares over sigmas, and so a thousandth apart where objects are a micrometre apart
-# (some ten of them, with sigmas of a centimetre). They are worth telling apart however small they are: the floor is that
-# of `Evidence.odds_against`.
+# Odds are the exponential of a sum of squares over sigmas, and so a thousandth apart where objects are a micrometre
+# apart (some ten of them, with sigmas of a centimetre). They are worth telling apart however small they are: the floor
+# is that of `Evidence.odds_against`.
 _ODDS = Tolerance(1e-300, 1e-3)
 _NO_FRAME = "transforms from the map to odometry that were not written, as odometry names no frame of its own"
 
