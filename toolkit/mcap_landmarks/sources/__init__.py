@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.sources._merge import Piece, merge
-from mcap_landmarks.sources._shape import Carried, Log, McapFile, NoConfig, SourceFormat, SourceLog
+from mcap_landmarks.sources._shape import Carried, Log, McapFile, NoConfig, Source, SourceLog
 
 
 def source_names() -> tuple[str, ...]:
@@ -14,14 +14,14 @@ def source_names() -> tuple[str, ...]:
     return tuple(sorted(entry.name for entry in pkgutil.iter_modules(__path__) if not entry.name.startswith("_")))
 
 
-def find_source(name: str) -> SourceFormat:
+def find_source(name: str) -> Source:
     """The declaration of a source, imported now."""
     source = importlib.import_module(f"{__name__}.{name}").SOURCE
-    assert isinstance(source, SourceFormat)  # noqa: S101 - a contract of this folder, held by tests/contract
+    assert isinstance(source, Source)  # noqa: S101 - a contract of this folder, held by tests/contract
     return source
 
 
-def source_of(path: Path) -> SourceFormat:
+def source_of(path: Path) -> Source:
     """The source that reads a path.
 
     Raises:
@@ -46,7 +46,7 @@ __all__ = [
     "McapFile",
     "NoConfig",
     "Piece",
-    "SourceFormat",
+    "Source",
     "SourceLog",
     "find_source",
     "merge",

@@ -85,7 +85,7 @@ class SourceLog:
 
 
 @dataclass(frozen=True, slots=True)
-class SourceFormat:
+class Source:
     """A foreign format: its name, what it reads in words, and its code.
 
     `config` is a dataclass with a default for every field. `open` gives the logs, usable until the block ends.

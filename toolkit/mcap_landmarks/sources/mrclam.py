@@ -35,7 +35,7 @@ from mcap_landmarks.sources._mrclam_robot import (
     odometry_covariance,
     scans,
 )
-from mcap_landmarks.sources._shape import SourceFormat, SourceLog
+from mcap_landmarks.sources._shape import Source, SourceLog
 from mcap_landmarks.stage import Channel, ChannelSummary, Connection, Progress, RawMessage
 
 _BARCODES, _LANDMARKS = "Barcodes.dat", "Landmark_Groundtruth.dat"
@@ -212,4 +212,4 @@ def _landmark(subject: int) -> str:
     return f"landmark_{subject}"
 
 
-SOURCE = SourceFormat("mrclam", "UTIAS MRCLAM data sets (folder or .zip)", MrclamConfig, recognises, open_mrclam)
+SOURCE = Source("mrclam", "UTIAS MRCLAM data sets (folder or .zip)", MrclamConfig, recognises, open_mrclam)

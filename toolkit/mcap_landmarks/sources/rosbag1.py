@@ -12,7 +12,7 @@ from mcap_landmarks.sources._bag_container import MAGIC, BagConnection, BagMessa
 from mcap_landmarks.sources._bag_index import BagIndex, read_chunk, read_index
 from mcap_landmarks.sources._merge import merge
 from mcap_landmarks.sources._ros1_types import Convert, converted
-from mcap_landmarks.sources._shape import NoConfig, SourceFormat, SourceLog
+from mcap_landmarks.sources._shape import NoConfig, Source, SourceLog
 from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
 
 
@@ -158,4 +158,4 @@ def _carried(described: BagConnection) -> tuple[Connection, Convert | MessageErr
     return Connection(topic, type_.message_type, type_.definition.encode(), metadata=metadata), type_.convert
 
 
-SOURCE = SourceFormat("rosbag1", "ROS 1 bags (.bag)", NoConfig, recognises, open_bag)
+SOURCE = Source("rosbag1", "ROS 1 bags (.bag)", NoConfig, recognises, open_bag)

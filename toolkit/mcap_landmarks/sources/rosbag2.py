@@ -15,7 +15,7 @@ from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.sources._db3 import ZSTD_MAGIC, Db3Log
 from mcap_landmarks.sources._mcap import carry
 from mcap_landmarks.sources._ros2_types import check_distribution, known_distribution
-from mcap_landmarks.sources._shape import Log, McapFile, SourceFormat, SourceLog
+from mcap_landmarks.sources._shape import Log, McapFile, Source, SourceLog
 
 _SUFFIXES = (".db3", ".mcap", ".db3.zstd", ".mcap.zstd")
 _MAGICS = (b"SQLite format 3\0", b"\x89MCAP0\r\n")
@@ -193,4 +193,4 @@ def _distribution(about: Mapping[str, object]) -> str | None:
     return name if known_distribution(name) else None
 
 
-SOURCE = SourceFormat("rosbag2", "ROS 2 bags (folder, .db3, .mcap, also .zstd)", Rosbag2Config, recognises, open_bag)
+SOURCE = Source("rosbag2", "ROS 2 bags (folder, .db3, .mcap, also .zstd)", Rosbag2Config, recognises, open_bag)
