@@ -32,7 +32,7 @@ def measure(quick: bool) -> Iterator[Row]:
     growth = float(np.median(quarters[:, 1] / quarters[:, 0]))
     first, last = 1e3 * np.median(quarters, axis=0)
     peers = {"first quarter ms": float(first), "last quarter ms": float(last)}
-    yield Row("street_growth", growth, at_most=1.3, cases=len(quarters) * SCANS_HZ * SECONDS // 4, peers=peers)
+    yield Row("street_growth", growth, "x", at_most=1.3, cases=len(quarters) * SCANS_HZ * SECONDS // 4, peers=peers)
 
 
 def _quarters() -> tuple[float, float]:
