@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mcap_landmarks.classes import Size
 from mcap_landmarks.fusion.box_geometry import BoxGeometry, box_geometry, misfits
+from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.geometry.se2 import Array
 
@@ -99,6 +100,23 @@ def test_a_turn_since_the_scan_makes_bearings_unsure_and_turns_covariances() -> 
     own = BEARING**2 + turn**2 + (0.04**2 + 0.06**2) / 25
     expected = np.sqrt(own + found.sigma_rad[0] ** 2 / 2 + (0.2 * np.arctan(0.1)) ** 2)
     assert sigma[0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_camera_may_look_back() -> None:
+    """Where bearings go round."""
+    view = camera_view()
+    turn = np.diag([-1.0, -1.0, 1.0, 1.0])
+    back = CameraView(view.camera, turn @ view.base_from_camera, view.scan_from_image, 0.0)
+    boxes = np.array([box(0.1, 0.1, -0.1, -0.1)])
+    found = box_geometry(back, boxes, CONFIG)
+    assert abs(found.middle[0]) == pytest.approx(np.pi)
+    assert found.half[0] == pytest.approx(np.arctan(0.1))
+    centres = np.array([[-5.1, 0.6], [-5.1, -0.6]]), np.zeros((2, 2, 2))
+    aside, _, _ = misfits(back, found, 0, centres, ANY, CONFIG)
+    expected, _, _ = misfit(seen(boxes[0]), ANY, (5.0, -0.6), (5.0, 0.6))
+    np.testing.assert_allclose(aside, expected)
+    assert found.covers(np.pi - 0.05, 0.0, np.array([True]))
+    assert found.covers(0.05 - np.pi, 0.0, np.array([True]))
 
 
 def cut_box(*, left: bool = False, right: bool = False) -> BoxGeometry:

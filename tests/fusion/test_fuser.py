@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from mcap_landmarks.channels import DETECTIONS, SCAN_OBJECTS
 from mcap_landmarks.fusion.config import FuseConfig
+from mcap_landmarks.fusion.fuser import Fuser
+from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import Bundle, OdometryAt
 
-from tests.fusion.cylinders import THREE, Thing, boxes, bundle, detected, fused, moved, scanned
+from tests.fusion.cylinders import THREE, Thing, believe, boxes, bundle, camera_view, detected, fused, moved, scanned
 
 SECOND = 10**9
 NAMES = [thing.name for thing in THREE]
@@ -195,3 +197,141 @@ def test_boxes_that_another_object_explains_are_its_own() -> None:
     places = [xy for xy, name in zip(last.positions_xy.tolist(), last.classes, strict=True) if name == "fire hydrant"]
     assert len(places) == 1
     np.testing.assert_allclose(places[0], [hydrant.x - 4.5, hydrant.y], atol=0.05)
+
+
+def step(
+    fuser: Fuser, seen: Sequence[Thing], named: Sequence[Thing] | None, odometry: Array | None, score: float = 0.3
+) -> tuple[SceneObjects, int]:
+    """A scan, and boxes of an image at the same time, if there is one."""
+    if named is None:
+        return fuser.add(scanned(seen, SECOND), None, None, odometry)
+    given = detected([thing.name for thing in named], boxes(named), SECOND, score)
+    return fuser.add(scanned(seen, SECOND), given, camera_view(), odometry)
+
+
+def probabilities(scene: SceneObjects) -> list[float]:
+    return [options[0][1] for options in scene.hypotheses]
+
+
+def test_evidence_adds_up_along_a_way() -> None:
+    """Of a poor detector's boxes, from places 0.4 m apart; none is surer than a thousand to one."""
+    fuser, found = Fuser(FuseConfig()), []
+    for i in range(3):
+        things = moved(THREE, (1.0, 0.0, 0.0), 0.4 * i)
+        found.append(probabilities(step(fuser, things, things, np.array([0.4 * i, 0.0, 0.0]))[0]))
+    expected = [[0.740964, 0.798649, 0.578925], [0.996091, 0.994408, 0.982747], [1000 / 1001] * 3]
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_images_from_one_place_say_the_same_again() -> None:
+    fuser = Fuser(FuseConfig())
+    found = [probabilities(step(fuser, THREE, THREE, np.zeros(3))[0]) for _ in range(3)]
+    expected = [[0.740964, 0.798649, 0.578925], [0.850002, 0.891923, 0.709323], [0.918208, 0.944966, 0.812424]]
+    np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_turning_on_the_spot_shows_nothing_new() -> None:
+    """What is to the left after a turn to the right is where it was."""
+    turned, stood = Fuser(FuseConfig()), Fuser(FuseConfig())
+    for i in range(3):
+        things = moved(THREE, (0.0, 0.0, -0.1), float(i))
+        scene, _ = step(turned, things, things, np.array([0.0, 0.0, -0.1 * i]))
+        expected, _ = step(stood, THREE, THREE, np.zeros(3))
+    np.testing.assert_allclose(probabilities(scene), probabilities(expected), atol=0.06)
+
+
+def test_without_odometry_every_scan_is_judged_on_its_own() -> None:
+    """By higher odds at first, since no second look could mend what is left out."""
+    scene, _ = step(Fuser(FuseConfig()), THREE, THREE, None)
+    np.testing.assert_allclose(probabilities(scene), [0.966221, 0.975409, 0.932198], atol=1e-5)
+
+
+def test_a_miss_counts_where_the_image_would_show_the_object_only() -> None:
+    """The person is gone from the image, and so are the others; a thing behind the robot is not looked for."""
+    fuser = Fuser(FuseConfig())
+    behind = Thing("chair", -4.0, 0.0)
+    for i in range(3):
+        things = moved([*THREE, behind], (1.0, 0.0, 0.0), 0.4 * i)
+        step(fuser, things, things[:3], np.array([0.4 * i, 0.0, 0.0]), 0.8)
+    believe(fuser._tracks, "3", "chair", 0.9)
+    things = moved([*THREE, behind], (1.0, 0.0, 0.0), 1.6)
+    scene, unexplained = step(fuser, things, things[::2][:2], np.array([1.6, 0.0, 0.0]), 0.8)
+    assert unexplained == 0
+    assert scene.ids == ("0", "1", "2", "3")
+    shares = probabilities(scene)
+    assert shares[0] == shares[2] == pytest.approx(1000 / 1001)
+    assert shares[1] == pytest.approx(200 / 201, rel=1e-4)
+    assert shares[3] == pytest.approx(0.9)
+
+
+def test_boxes_are_kept_where_they_tell_something_new_and_the_place_is_known() -> None:
+    """For telling later which of two tracks they were of."""
+    fuser = Fuser(FuseConfig())
+    for i in (0, 0, 1):
+        things = moved(THREE, (1.0, 0.0, 0.0), 0.4 * i)
+        step(fuser, things, things, np.array([0.4 * i, 0.0, 0.0]))
+    assert [(box.bundle, box.name) for box in fuser._tracks["1"].history.boxes] == [(1, "person"), (3, "person")]
+    assert [sorted(fuser._tracks[name].history.places) for name in ("0", "1", "2")] == [[1, 2, 3]] * 3
+    lost = Fuser(FuseConfig())
+    step(lost, THREE, THREE, None)
+    assert lost._tracks["1"].history.boxes == []
+    assert lost._tracks["1"].place_xy is None
+
+
+def test_a_box_that_the_image_cuts_at_a_side_does_not_tell_a_radius() -> None:
+    """One that it cuts above does."""
+    whole, cut = Thing("vase", 4.0, 0.5), Thing("vase", 2.0, 1.1)
+    fuser = Fuser(FuseConfig())
+    step(fuser, (whole,), (whole,), np.zeros(3))
+    radius_m = fuser._tracks["0"].belief.radii_m["vase"]
+    assert radius_m == pytest.approx(0.2, abs=0.01)
+    assert boxes([cut])[0, 0] == 0
+    step(fuser, (cut,), (cut,), np.array([2.0, -0.6, 0.0]))
+    assert fuser._tracks["0"].belief.hits == 2
+    assert fuser._tracks["0"].belief.radii_m["vase"] == radius_m
+    near = Thing("vase", 1.3, 0.0)
+    assert boxes([near])[0, 1] == 0
+    step(fuser, (near,), (near,), np.array([2.7, 0.5, 0.0]))
+    assert fuser._tracks["0"].belief.radii_m["vase"] != radius_m
+
+
+def test_two_tracks_compete_for_a_box_and_the_likelier_one_has_it() -> None:
+    """The box is of the nearer one; the other one, half a metre beside it, is not named at all."""
+    two = (Thing("person", 6.0, 0.0), Thing("person", 6.0, 0.5), THREE[2])
+    scene, _ = step(Fuser(FuseConfig()), two, two[::2], np.zeros(3), 0.8)
+    assert scene.ids == ("0", "2")
+    between = (Thing("person", 6.0, 0.02), Thing("person", 6.0, -0.02), THREE[2])
+    scene, _ = step(Fuser(FuseConfig()), between, (Thing("person", 6.0, 0.0), THREE[2]), np.zeros(3), 0.8)
+    assert scene.ids[-1] == "2"
+    assert len(scene) <= 2
+    for track in probabilities(scene)[:-1]:
+        assert track < 0.6  # it could be the other one as well
+
+
+def test_a_scan_without_an_image_keeps_what_is_known() -> None:
+    fuser = Fuser(FuseConfig())
+    before, _ = step(fuser, THREE, THREE, np.zeros(3))
+    after, unexplained = step(fuser, moved(THREE, (1.0, 0.0, 0.0), 0.4), None, np.array([0.4, 0.0, 0.0]))
+    assert unexplained == 0
+    assert after.hypotheses == before.hypotheses
+    np.testing.assert_allclose(after.positions_xy, before.positions_xy - [0.4, 0.0])
+
+
+@pytest.mark.parametrize(("with_image", "with_odometry"), [(True, True), (False, True), (True, False)])
+def test_a_track_that_comes_back_is_told_of_as_of_the_last_image(with_image: bool, with_odometry: bool) -> None:
+    """The nearer of two in line had the boxes at first; it is out of sight while the farther one gets its own."""
+    hydrant, cone = Thing("fire hydrant", 9.0, 0.6), Thing("cone", 7.0, 0.46)
+    fuser, last = Fuser(FuseConfig()), 18
+    for i in range(last + 1):
+        local = dict(zip(("near", "beside", "far"), moved([cone, THREE[2], hydrant], (0.3, 0.0, 0.0), i), strict=True))
+        given = detected(["fire hydrant", "suitcase"], boxes([local["far"], local["beside"]]), SECOND)
+        if i < 4:
+            del local["far"]
+        elif 6 <= i < last:
+            del local["near"]
+        image = (given, camera_view()) if with_image or i < last else (None, None)
+        objects = scanned(list(local.values()), SECOND, list(local))
+        odometry = np.array([0.3 * i, 0.0, 0.0]) if with_odometry or i < last else None
+        scene, _ = fuser.add(objects, *image, odometry)
+    assert scene.ids == ("beside", "far")
+    assert fuser._tracks["near"].belief.best()[0] == "fire hydrant"

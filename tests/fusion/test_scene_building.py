@@ -39,8 +39,9 @@ def test_a_class_must_be_as_probable_as_the_settings_say(share: float, told: int
 
 
 def test_what_no_box_has_named_is_not_told_even_if_nothing_need_be_sure() -> None:
-    objects, table = known(*THREE[:2], config=FuseConfig(min_probability=0.0))
-    table["0"].belief.log_odds = {}
+    objects = dataclasses.replace(scanned(THREE[:2], 7), hypotheses=((("person", 1.0),),) * 2)
+    table = tracked(objects, FuseConfig(min_probability=0.0))
+    believe(table, "1", "person")
     assert scene_of(objects, table).ids == ("1",)
 
 

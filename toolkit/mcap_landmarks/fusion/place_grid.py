@@ -44,7 +44,7 @@ class PlaceGrid:
 
     def _overlapping(self, centre_xy: Array, radius_m: float) -> Iterator[Cell]:
         """The cells that have something and overlap the square around a circle."""
-        if not (2 * radius_m / self._cell_m + 1) ** 2 < len(self._names):
+        if (2 * radius_m / self._cell_m) ** 2 >= len(self._names):
             yield from self._names
             return
         columns, rows = (range(self._index(at - radius_m), self._index(at + radius_m) + 1) for at in centre_xy)
