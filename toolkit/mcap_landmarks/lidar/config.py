@@ -21,7 +21,7 @@ Sections = dict[str, tuple[Annotated[Section, Discriminator("kind")], ...]]
 
 
 def _sections() -> Sections:
-    return {name: known.sections for name, known in CLASSES.items()}
+    return {name: known.sections for name, known in CLASSES.items() if known.sections}
 
 
 def _over_known(given: object) -> object:
