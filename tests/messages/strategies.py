@@ -4,6 +4,8 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from mcap_landmarks.messages.annotations import ImageAnnotations, Label, Outline
+from mcap_landmarks.messages.boxes import Boxes
+from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.markers import Marker, MarkerArray, MarkerShape
@@ -36,12 +38,29 @@ transform = st.builds(Transform, stamp, text, text, vector(3), vector(4))
 
 
 @st.composite
+def boxes(draw: st.DrawFn, n: int) -> Boxes | None:
+    """As many boxes, or none: what has no height is no box."""
+    if n == 0 or draw(st.booleans()):
+        return None
+    sizes = draw(vector(n, 3, elements=st.floats(0.1, 100)))
+    return Boxes(draw(vector(n, 3)), sizes, np.zeros(n))
+
+
+@st.composite
+def clustered_cloud(draw: st.DrawFn) -> ClusteredCloud:
+    points = draw(cloud_points)
+    heights = draw(arrays(np.float32, len(points), elements=st.floats(width=32)))
+    return ClusteredCloud(draw(stamp), draw(text), points, heights, draw(arrays(np.int32, len(points))))
+
+
+@st.composite
 def scene_objects(draw: st.DrawFn) -> SceneObjects:
     n = draw(st.integers(0, 4))
     classes = draw(st.lists(hypotheses.filter(len), min_size=n, max_size=n).map(tuple))
     ids = draw(st.lists(text, min_size=n, max_size=n).map(tuple))
-    radii = draw(vector(n, elements=st.floats(0, 100)))
-    return SceneObjects(draw(stamp), draw(text), ids, classes, draw(vector(n, 2)), draw(vector(n, 2, 2)), radii)
+    around = draw(boxes(n))
+    radii = around.sizes_m[:, 0] / 2 if around else draw(vector(n, elements=st.floats(0, 100)))
+    return SceneObjects(draw(stamp), draw(text), ids, classes, draw(vector(n, 2)), draw(vector(n, 2, 2)), radii, around)
 
 
 @st.composite
@@ -50,7 +69,9 @@ def scan_objects(draw: st.DrawFn) -> ScanObjects:
     ids = draw(st.lists(text, min_size=len(classes), max_size=len(classes)).map(tuple))
     points = tuple(draw(vector(len(options), 2)) for options in classes)
     spreads = tuple(draw(vector(len(options), 2, 2)) for options in classes)
-    return ScanObjects(draw(stamp), draw(text), ids, classes, points, spreads, draw(vector(len(classes))))
+    around = draw(boxes(len(classes)))
+    extents = around.sizes_m[:, 0] if around else draw(vector(len(classes)))
+    return ScanObjects(draw(stamp), draw(text), ids, classes, points, spreads, extents, around)
 
 
 @st.composite
@@ -97,6 +118,7 @@ MESSAGES = st.one_of(
     st.builds(TFMessage, st.lists(transform, max_size=3).map(tuple)),
     st.builds(LaserScan, stamp, text, *[single] * 7, scan_ranges, scan_ranges),
     st.builds(PointCloud2, stamp, text, cloud_points),
+    clustered_cloud(),
     st.builds(CompressedImage, stamp, text, text, st.binary(max_size=30)),
     st.builds(
         Image, stamp, text, st.integers(0, 9), st.integers(0, 9), text, st.booleans(), st.integers(0, 9), st.binary()

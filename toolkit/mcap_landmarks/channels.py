@@ -3,6 +3,7 @@
 from itertools import takewhile
 
 from mcap_landmarks.messages.annotations import ImageAnnotations
+from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage
 from mcap_landmarks.messages.markers import MarkerArray
@@ -25,6 +26,7 @@ TF_STATIC = Channel("/tf_static", TFMessage)
 DETECTIONS = Channel("/landmarks/detections", Detections)
 ANNOTATIONS = Channel("/camera/annotations", ImageAnnotations)
 SCAN_OBJECTS = Channel("/landmarks/scan_objects", ScanObjects)
+CLUSTERED_CLOUD = Channel("/landmarks/clustered_cloud", ClusteredCloud)
 SCAN_FILTERED = Channel("/landmarks/scan_filtered", LaserScan)
 SCENE_OBJECTS = Channel("/landmarks/scene_objects", SceneObjects)
 SCENE_MARKERS = Channel("/landmarks/scene_markers", MarkerArray)

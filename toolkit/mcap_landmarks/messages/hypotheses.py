@@ -37,13 +37,15 @@ def hypotheses_from_ros(detection: RosObject) -> Hypotheses:
     return tuple((result.hypothesis.class_id, float(result.hypothesis.score)) for result in detection.results)
 
 
-def object_to_ros(
-    header: RosObject, identity: str, results: list[RosObject], middle_xy: Iterable[float], size_m: float
-) -> RosObject:
-    """A `vision_msgs/Detection3D` in a box as long as it is wide."""
-    box = make(
+def flat_box_to_ros(middle_xy: Iterable[float], size_m: float) -> RosObject:
+    """A `vision_msgs/BoundingBox3D` without a height, as long as it is wide."""
+    return make(
         "vision_msgs/BoundingBox3D",
         center=pose_to_ros((*middle_xy, 0.0), _UPRIGHT),
         size=make("geometry_msgs/Vector3", x=size_m, y=size_m, z=0.0),
     )
+
+
+def object_to_ros(header: RosObject, identity: str, results: list[RosObject], box: RosObject) -> RosObject:
+    """A `vision_msgs/Detection3D`."""
     return make("vision_msgs/Detection3D", header=header, results=results, bbox=box, id=identity)

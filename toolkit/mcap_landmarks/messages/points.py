@@ -1,5 +1,6 @@
 """PointCloud2: only where its points are, and when each was measured."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
@@ -43,30 +44,10 @@ class PointCloud2:
 
     def to_ros(self) -> RosObject:
         """See `Message`; one row of points with fields x, y and z, and t where times are known."""
-        names = "xyz" if self.times_ns is None else "xyzt"
-        points = np.zeros(len(self.points_m), [(name, "<i4" if name == "t" else "<f4") for name in names])
-        for i, name in enumerate("xyz"):
-            points[name] = self.points_m[:, i]
+        columns = {name: self.points_m[:, i] for i, name in enumerate("xyz")}
         if self.times_ns is not None:
-            points["t"] = self.times_ns
-        fields = [
-            make(
-                "sensor_msgs/PointField", name=name, offset=4 * i, datatype=_INT32 if name == "t" else _FLOAT32, count=1
-            )
-            for i, name in enumerate(names)
-        ]
-        return make(
-            "sensor_msgs/PointCloud2",
-            header=header_to_ros(self.stamp_ns, self.frame_id),
-            height=1,
-            width=len(points),
-            fields=fields,
-            is_bigendian=False,
-            point_step=points.itemsize,
-            row_step=points.nbytes,
-            data=points.view(np.uint8),
-            is_dense=bool(np.isfinite(self.points_m).all()),
-        )
+            columns["t"] = self.times_ns.astype(np.int32)
+        return cloud_to_ros(header_to_ros(self.stamp_ns, self.frame_id), columns)
 
     @classmethod
     def from_ros(cls, ros: RosObject) -> Self:
@@ -82,7 +63,7 @@ class PointCloud2:
         places = {name: order + _coordinate(fields[name]) for name in "xyz"}
         times = {name: order + _TIMES[field.datatype] for name, field in fields.items() if _is_time(field)}
         layout = {**places, **times}
-        points = _points(ros, layout, [fields[name].offset for name in layout])
+        points = points_from_ros(ros, layout)
         xyz = np.stack([np.asarray(points[name], dtype=np.float32) for name in "xyz"], axis=1)
         stamp_ns = stamp_from_ros(ros.header.stamp)
         returned = np.array(np.isfinite(xyz).all(axis=1), dtype=np.bool_)
@@ -101,9 +82,45 @@ def _is_time(field: RosObject) -> bool:
     return field.name in _TIME_NAMES and field.datatype in _TIMES
 
 
-def _points(ros: RosObject, layout: dict[str, str], offsets: list[int]) -> NDArray[np.void]:
-    """The points of a cloud of the typestore, one after the other, with the fields of a layout."""
+def cloud_to_ros(header: RosObject, columns: Mapping[str, NDArray[np.float32] | NDArray[np.int32]]) -> RosObject:
+    """A `sensor_msgs/PointCloud2` of one row of points, whose fields are columns (N,) by name, four bytes each."""
+    points = np.zeros(
+        len(next(iter(columns.values()))), [(name, f"<{values.dtype.kind}4") for name, values in columns.items()]
+    )
+    for name, values in columns.items():
+        points[name] = values
+    fields = [
+        make(
+            "sensor_msgs/PointField",
+            name=name,
+            offset=4 * i,
+            datatype=_INT32 if values.dtype.kind == "i" else _FLOAT32,
+            count=1,
+        )
+        for i, (name, values) in enumerate(columns.items())
+    ]
+    return make(
+        "sensor_msgs/PointCloud2",
+        header=header,
+        height=1,
+        width=len(points),
+        fields=fields,
+        is_bigendian=False,
+        point_step=points.itemsize,
+        row_step=points.nbytes,
+        data=points.view(np.uint8),
+        is_dense=all(bool(np.isfinite(values).all()) for values in columns.values()),
+    )
+
+
+def points_from_ros(ros: RosObject, layout: Mapping[str, str]) -> NDArray[np.void]:
+    """The points of a cloud of the typestore, one after the other, with the fields of a layout: formats by name.
+
+    Raises:
+        MessageError: the data are shorter than they say.
+    """
     names, formats = list(layout), list(layout.values())
+    offsets = [next(field.offset for field in ros.fields if field.name == name) for name in names]
     point = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": int(ros.point_step)})
     rows = np.ascontiguousarray(ros.data).reshape(-1)
     if len(rows) < ros.height * ros.row_step or ros.row_step < ros.width * ros.point_step:

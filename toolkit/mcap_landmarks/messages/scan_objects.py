@@ -5,8 +5,10 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from mcap_landmarks.messages.boxes import Boxes
 from mcap_landmarks.messages.hypotheses import (
     Hypotheses,
+    flat_box_to_ros,
     hypotheses_from_ros,
     object_to_ros,
     place_to_ros,
@@ -24,6 +26,7 @@ class ScanObjects:
     often as it has shapes, and at last ("", probability that it is none of them), the bare surface.
     positions_xy[i] (K_i, 2): the centre of the cross-section in metres under each hypothesis, of the bare surface its
     middle as the scan sees it; covariances[i] (K_i, 2, 2) in m^2. extents_m (N,): the largest distance of two hits.
+    `boxes` hug the objects of a cloud, which has no shapes to compare with: their lengths are the extents.
     """
 
     ROS_TYPE: ClassVar[str] = "vision_msgs/msg/Detection3DArray"
@@ -35,12 +38,13 @@ class ScanObjects:
     positions_xy: tuple[Array, ...]
     covariances: tuple[Array, ...]
     extents_m: Array
+    boxes: Boxes | None = None
 
     def __len__(self) -> int:
         return len(self.ids)
 
     def to_ros(self) -> RosObject:
-        """See `Message`; the box of an object spans its extent about the last hypothesis."""
+        """See `Message`; a box that is not known spans the object's extent about the last hypothesis."""
         header = header_to_ros(self.stamp_ns, self.frame_id)
         return make(
             "vision_msgs/Detection3DArray",
@@ -52,7 +56,8 @@ class ScanObjects:
         places = [place_to_ros(*place) for place in zip(self.positions_xy[i], self.covariances[i], strict=True)]
         results = results_to_ros(self.hypotheses[i], places)
         middle = self.positions_xy[i][-1].tolist() if results else (0.0, 0.0)
-        return object_to_ros(header, self.ids[i], results, middle, float(self.extents_m[i]))
+        box = self.boxes.to_ros(i) if self.boxes else flat_box_to_ros(middle, float(self.extents_m[i]))
+        return object_to_ros(header, self.ids[i], results, box)
 
     @classmethod
     def from_ros(cls, ros: RosObject) -> Self:
@@ -73,4 +78,5 @@ class ScanObjects:
             tuple(positions),
             tuple(covariances),
             np.array([detection.bbox.size.x for detection in ros.detections], dtype=np.float64),
+            Boxes.from_ros([detection.bbox for detection in ros.detections]),
         )

@@ -5,8 +5,10 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from mcap_landmarks.messages.boxes import Boxes
 from mcap_landmarks.messages.hypotheses import (
     Hypotheses,
+    flat_box_to_ros,
     hypotheses_from_ros,
     object_to_ros,
     place_to_ros,
@@ -22,7 +24,8 @@ class SceneObjects:
 
     ids: track, landmark or truth ids. hypotheses: per object (class name, probability), most probable first.
     positions_xy (N, 2) are the centres of the cross-sections in metres; covariances (N, 2, 2) in m^2, all zero where
-    unknown; radii_m (N,), zero where unknown.
+    unknown; radii_m (N,), zero where unknown. `boxes` say how the objects of a cloud lie: their lengths are twice the
+    radii.
     """
 
     ROS_TYPE: ClassVar[str] = "vision_msgs/msg/Detection3DArray"
@@ -34,6 +37,7 @@ class SceneObjects:
     positions_xy: Array
     covariances: Array
     radii_m: Array
+    boxes: Boxes | None = None
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -55,7 +59,8 @@ class SceneObjects:
     def _object_to_ros(self, header: RosObject, i: int) -> RosObject:
         place = place_to_ros(self.positions_xy[i], self.covariances[i])
         results = results_to_ros(self.hypotheses[i], [place] * len(self.hypotheses[i]))
-        return object_to_ros(header, self.ids[i], results, self.positions_xy[i].tolist(), 2 * float(self.radii_m[i]))
+        flat = flat_box_to_ros(self.positions_xy[i].tolist(), 2 * float(self.radii_m[i]))
+        return object_to_ros(header, self.ids[i], results, self.boxes.to_ros(i) if self.boxes else flat)
 
     @classmethod
     def from_ros(cls, ros: RosObject) -> Self:
@@ -76,4 +81,5 @@ class SceneObjects:
             positions,
             covariances,
             np.array([detection.bbox.size.x / 2 for detection in detections], dtype=np.float64),
+            Boxes.from_ros([detection.bbox for detection in detections]),
         )
