@@ -104,7 +104,6 @@ def test_a_slice_of_a_point_cloud(tmp_path: Path, capsys: pytest.CaptureFixture[
     np.testing.assert_allclose(found.positions_xy[0][0], [3.0, 0.5], atol=0.03)
     for code, said, words in (
         (1, "there is no scan", ()),
-        (2, "give --slice ZMIN:ZMAX", ("--scan-from", "/points")),
         (2, "--slice 0.3:0.1: give two heights", ("--scan-from", "/points", "--slice", "0.3:0.1")),
         (2, "--slice low: give two heights", ("--scan-from", "/points", "--slice", "low")),
         (2, "--scan-from takes the place of --scan", ("--scan-from", "/points", "--scan", "/points")),

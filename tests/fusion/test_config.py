@@ -21,7 +21,7 @@ def test_sizes_add_to_those_of_known_classes() -> None:
 
 def test_no_object_is_larger_than_the_largest() -> None:
     """Of a class of its own, or as wide as the boxes of one without may be."""
-    assert FuseConfig().largest_radius_m == 3.0
+    assert FuseConfig().largest_radius_m == CLASSES["bus"].size.radius_m == 5.8
     bus = Size(top_m=(2.5, 4.0), width_m=(2.5, 12.0), radius_m=6.0)
     assert FuseConfig(sizes={"bus": bus, "urn": OWN}).largest_radius_m == 6.0
 

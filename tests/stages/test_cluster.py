@@ -129,7 +129,9 @@ def test_a_slice_of_a_cloud_is_a_scan() -> None:
     (found,) = results([bundle(cloud, mounting())], ClusterConfig(slice_m=(0.1, 0.3)))
     np.testing.assert_allclose(places(found, "fire hydrant", "suitcase"), [[3.0, 0.6], [2.5, -1.0]], atol=0.02)
     with pytest.raises(UsageError, match="--slice ZMIN:ZMAX"):
-        results([bundle(cloud, mounting())])
+        results([bundle(cloud, mounting(), second=scan(distances))])
+    with pytest.raises(UsageError, match="--slice ZMIN:ZMAX"):
+        results([bundle(scan(distances), mounting(), second=cloud)])
 
 
 def drive(

@@ -39,12 +39,16 @@ ScanFrom = Annotated[
     typer.Option(
         "--scan-from",
         metavar="TOPIC",
-        help="Point cloud to take a slice of as the scan; de-skewed if its points tell their times.",
+        help="Point cloud to read as the scan, whole or a slice of it; de-skewed if its points tell their times.",
     ),
 ]
 Slice = Annotated[
     str | None,
-    typer.Option("--slice", metavar="ZMIN:ZMAX", help="Heights of the slice above the base frame, in metres."),
+    typer.Option(
+        "--slice",
+        metavar="ZMIN:ZMAX",
+        help="Take a slice of the cloud alone, between heights above the base frame in metres.",
+    ),
 ]
 ImageRate = Annotated[
     float | None, typer.Option("--image-rate", metavar="HZ", help="Leave out images that come faster than this.")

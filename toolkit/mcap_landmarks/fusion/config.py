@@ -17,7 +17,9 @@ class FuseConfig:
     """How detections and scan objects become scene objects.
 
     Only detections of `landmark_classes` count (all, if empty), and those of `ignore_classes` never. An object is in
-    the scene if its most probable class has `min_probability`, and a scene has at least `min_objects`, else none.
+    the scene if its most probable class has `min_probability`, and the scene of a planar scan has at least
+    `min_objects`, else none. Where a cloud has no points on it the camera alone places an object, if the range is sure
+    to `camera_sigma_m`.
     `sizes` add to the built-in ones, by class: what heights and widths of a box are plausible, and the radius at the
     LiDAR's height; a class without gets its radius from the width of its boxes. A box and an object belong together if
     the chi-squares of their bearing and of its height and width are below `bearing_gate` and `size_gate`. Boxes are
@@ -50,6 +52,7 @@ class FuseConfig:
     max_odds: Positive = 1e3
     min_height_px: Positive = 20.0
     rectified: bool = False
+    camera_sigma_m: Positive = 3.0
     image_centre_px: float = 320.5
 
     @property

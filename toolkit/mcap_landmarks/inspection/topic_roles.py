@@ -92,7 +92,7 @@ def could_be(recording: Readable, channel: Channel[Message]) -> str:
     topics = [entry.connection.topic for entry in recording.channels if entry.connection.message_type in others]
     recorded = {topic for topic in topics if not topic.startswith((channels.RESULTS, channels.TRUTH))}
     fitting = sorted(topic for topic in recorded if not topic.endswith("_static"))
-    how = "--scan-from TOPIC --slice ZMIN:ZMAX" if channel == channels.SCAN else f"{role.option} TOPIC"
+    how = "--scan-from TOPIC" if channel == channels.SCAN else f"{role.option} TOPIC"
     return f"{' or '.join(fitting)} could be it, choose with {how}" if fitting else ""
 
 

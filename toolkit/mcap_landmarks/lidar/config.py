@@ -40,8 +40,12 @@ class ClusterConfig:
     `largest_m` is background; unset, what is larger than every shape. `range_m` and `view_deg` limit what is looked at:
     distances from the LiDAR, bearings in the base frame, counter-clockwise from, to; unset, all that the scan gives.
     `gate_m`: how far an object may be from where it was last, through odometry, and keep its id, which is kept for
-    `memory_s` without being seen. Of a point cloud the points between the heights `slice_m` in the base frame count,
-    the nearest one in every `slice_beam_deg`, or as finely as the cloud goes if that is coarser.
+    `memory_s` without being seen.
+
+    A point cloud is taken as a whole: points more than `clearance_m` and less than `tallest_m` above the ground around
+    them, in clusters of `fewest_points` or more. If `slice_m` is given, the points between those heights in the base
+    frame count alone, as a planar scan: the nearest one in every `slice_beam_deg`, or as finely as the cloud goes if
+    that is coarser.
 
     The thesis (Algorithm 2) has 0 to 30 and 330 to 360 degrees, 0.5 to 15 m, and the middle beam of every run of hits.
     """
@@ -59,5 +63,8 @@ class ClusterConfig:
     view_deg: tuple[float, float] | None = None
     gate_m: Positive = 0.5
     memory_s: Positive = 10.0
+    clearance_m: Positive = 0.25
+    tallest_m: Positive = 4.5
+    fewest_points: Annotated[int, Field(ge=1)] = 4
     slice_m: Rising | None = None
     slice_beam_deg: Annotated[float, Field(gt=0, le=10)] = 0.5

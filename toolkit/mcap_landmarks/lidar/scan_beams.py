@@ -1,7 +1,6 @@
 """Scan messages and point clouds as beams in the base frame, each at the time it was measured."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +11,9 @@ from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.lidar.beams import Beams, Limits, echoes, sweep
 from mcap_landmarks.lidar.clouds import in_slice, slice_beams
 from mcap_landmarks.lidar.config import ClusterConfig
+from mcap_landmarks.lidar.whole_clouds import BaseFromThen
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scan import LaserScan
-
-BaseFromThen = Callable[[NDArray[np.int64]], Array]
-"""Poses (N, 3) of the base at times (N,) in ns, in the base frame at the moment that is asked for."""
 
 
 def beams_of(
@@ -79,7 +76,9 @@ def _slice(
     config: ClusterConfig,
 ) -> Beams:
     if config.slice_m is None:
-        raise UsageError("a point cloud is cut between two heights above the base frame: give --slice ZMIN:ZMAX in m")
+        raise UsageError(
+            "a point cloud joins a planar scan as a slice between two heights: give --slice ZMIN:ZMAX in m"
+        )
     points = frames.apply(base_from_lidar, cloud.points_m)
     inside, moved = in_slice(points, config.slice_m), None
     if base_from_then is not None and cloud.times_ns is not None and inside.any():

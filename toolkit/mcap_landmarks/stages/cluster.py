@@ -5,7 +5,16 @@ from functools import partial
 
 import numpy as np
 
-from mcap_landmarks.channels import BASE_FRAME, ODOMETRY, SCAN, SCAN_FILTERED, SCAN_OBJECTS, SECOND_SCAN, TF_STATIC
+from mcap_landmarks.channels import (
+    BASE_FRAME,
+    CLUSTERED_CLOUD,
+    ODOMETRY,
+    SCAN,
+    SCAN_FILTERED,
+    SCAN_OBJECTS,
+    SECOND_SCAN,
+    TF_STATIC,
+)
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.lidar import thesis
@@ -15,7 +24,10 @@ from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.object_tracks import Tracks
 from mcap_landmarks.lidar.objects import Hypotheses
 from mcap_landmarks.lidar.scan_beams import beams_of
+from mcap_landmarks.lidar.whole_clouds import CloudObject, points_in_base, whole_cloud
 from mcap_landmarks.locations import Location
+from mcap_landmarks.messages.boxes import Boxes
+from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
@@ -32,7 +44,8 @@ def process(
 
     Raises:
         RecordingError: it is not known where the LiDAR sits.
-        UsageError: a point cloud, and no heights to cut it at, or the thesis's method, which has none.
+        UsageError: a point cloud beside a planar scan, and no heights to cut it at, or with the thesis's method, which
+            has none.
     """
     mounting = Mounting(resources.get("extrinsics"))
     if config.method == "thesis":
@@ -42,6 +55,9 @@ def process(
     tracks = Tracks(config.gate_m, config.memory_s)
     for bundle in bundles:
         base = _base_of(bundle, mounting)
+        if config.slice_m is None and isinstance(bundle.messages[SCAN], PointCloud2):
+            yield from _whole(bundle, base, mounting, tracks, config)
+            continue
         beams = _beams(bundle, base, mounting, config)
         if beams is None:
             yield Omission(bundle.log_time_ns, "a scan does not say in which directions its beams are", lost=True)
@@ -51,6 +67,27 @@ def process(
         odom_from_base = None if bundle.odometry is None else bundle.odometry.odom_from_base
         names = tracks.names(bundle.stamp_ns, odom_from_base, places)
         yield Stamped(SCAN_OBJECTS, bundle.log_time_ns, _message(bundle.stamp_ns, base, names, found))
+
+
+def _whole(bundle: Bundle, base: str, mounting: Mounting, tracks: Tracks, config: ClusterConfig) -> Iterator[Stamped]:
+    """The points above the ground of a bundle's clouds, and a box around each of their clusters."""
+    moved = None if bundle.odometry is None else partial(bundle.odometry.base_from_then, bundle.stamp_ns)
+    parts, places = [], []
+    for channel in (SCAN, SECOND_SCAN):
+        message = bundle.messages.get(channel)
+        if message is None:
+            continue
+        if not isinstance(message, PointCloud2):
+            raise UsageError("a planar scan joins a point cloud as a slice of it only: give --slice ZMIN:ZMAX in m")
+        base_from_lidar = mounting.lookup(bundle, base, message.frame_id)
+        parts.append(points_in_base(message, bundle.stamp_ns, base_from_lidar, moved))
+        places.append(base_from_lidar[:2, 3])
+    found = whole_cloud(np.concatenate(parts), places[0], config)
+    middles = np.array([one.rectangle.centre_xy for one in found.objects]).reshape(-1, 2)
+    names = tracks.names(bundle.stamp_ns, None if bundle.odometry is None else bundle.odometry.odom_from_base, middles)
+    cloud = ClusteredCloud(bundle.stamp_ns, base, found.points_m, found.heights_m, found.clusters)
+    yield Stamped(SCAN_OBJECTS, bundle.log_time_ns, _boxed(bundle.stamp_ns, base, names, found.objects))
+    yield Stamped(CLUSTERED_CLOUD, bundle.log_time_ns, cloud)
 
 
 def _base_of(bundle: Bundle, mounting: Mounting) -> str:
@@ -103,10 +140,30 @@ def _message(stamp_ns: int, base: str, names: tuple[str, ...], found: Sequence[H
     )
 
 
+def _boxed(stamp_ns: int, base: str, names: tuple[str, ...], found: Sequence[CloudObject]) -> ScanObjects:
+    """Objects that could be anything, each in a box."""
+    return ScanObjects(
+        stamp_ns,
+        base,
+        names,
+        ((("", 1.0),),) * len(found),
+        tuple(one.rectangle.centre_xy[None] for one in found),
+        tuple(one.rectangle.covariance[None] for one in found),
+        np.array([one.rectangle.length_m for one in found], dtype=np.float64),
+        Boxes(
+            np.array([[*one.rectangle.centre_xy, (one.foot_m + one.top_m) / 2] for one in found]).reshape(-1, 3),
+            np.array(
+                [[one.rectangle.length_m, one.rectangle.width_m, one.top_m - one.foot_m] for one in found]
+            ).reshape(-1, 3),
+            np.array([one.rectangle.yaw_rad for one in found], dtype=np.float64),
+        ),
+    )
+
+
 STAGE = Stage(
     "cluster",
     reads=(SCAN, SECOND_SCAN, ODOMETRY, TF_STATIC),
-    writes=(SCAN_OBJECTS, SCAN_FILTERED),
+    writes=(SCAN_OBJECTS, CLUSTERED_CLOUD, SCAN_FILTERED),
     config=ClusterConfig,
     process=process,
     options=("extrinsics",),

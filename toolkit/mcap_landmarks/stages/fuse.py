@@ -2,11 +2,13 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from mcap_landmarks.channels import (
     CAMERA_INFO,
+    CLUSTERED_CLOUD,
     DETECTIONS,
     ODOMETRY,
     SCAN_OBJECTS,
@@ -16,6 +18,7 @@ from mcap_landmarks.channels import (
 )
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.fusion.camera_view import CameraView
+from mcap_landmarks.fusion.cloud_fuser import CloudFuser
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.fuser import Fuser
 from mcap_landmarks.fusion.scene_markers import markers_from_scene
@@ -26,6 +29,7 @@ from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.scan_objects import ScanObjects
+from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.mounting import Mounting
 from mcap_landmarks.stage import Bundle, Omission, Stage, Stamped
 
@@ -41,7 +45,7 @@ def process(
     Raises:
         RecordingError: no detections lie beside the scans, the camera is unknown, or transforms are missing.
     """
-    fuser, mounting = Fuser(config), Mounting(resources.get("extrinsics"))
+    fusers, mounting = _Fusers(config, Fuser(config), CloudFuser(config)), Mounting(resources.get("extrinsics"))
     scans = images = 0
     for bundle in bundles:
         found = bundle.get(SCAN_OBJECTS)
@@ -50,13 +54,7 @@ def process(
         objects, given = usable(found), bundle.get(DETECTIONS)
         scans, images = scans + 1, images + (given is not None)
         detections, left_out = (None, Counter[str]()) if given is None else wanted(given, config)
-        if config.method == "thesis":
-            scene, unexplained = fuse_in_order(objects, detections, config.image_centre_px)
-        else:
-            view = None if detections is None else _view(bundle, detections, objects, mounting, config)
-            odometry = None if bundle.odometry is None else bundle.odometry.odom_from_base
-            scene, unexplained = fuser.add(objects, detections, view, odometry)
-        scene = at_least(scene, config.min_objects)
+        scene, unexplained = _fused(bundle, objects, detections, fusers, mounting)
         yield Stamped(SCENE_OBJECTS, bundle.log_time_ns, scene)
         yield Stamped(SCENE_MARKERS, bundle.log_time_ns, markers_from_scene(scene))
         left_out.update({_UNEXPLAINED: unexplained, _UNUSABLE: len(found) - len(objects)})
@@ -66,6 +64,31 @@ def process(
             f"no {DETECTIONS.topic} lie beside any of {scans} scans; run mcap-landmarks detect first, or read others "
             f"with --remap TOPIC={DETECTIONS.topic}"
         )
+
+
+@dataclass(frozen=True, slots=True)
+class _Fusers:
+    """The ways to fuse, by what the scans are."""
+
+    config: FuseConfig
+    planar: Fuser
+    clouds: CloudFuser
+
+
+def _fused(
+    bundle: Bundle, objects: ScanObjects, detections: Detections | None, fusers: _Fusers, mounting: Mounting
+) -> tuple[SceneObjects, int]:
+    """The scene of a bundle, and the number of its boxes that come to nothing."""
+    config, cloud = fusers.config, bundle.get(CLUSTERED_CLOUD)
+    if config.method == "thesis":
+        scene, unexplained = fuse_in_order(objects, detections, config.image_centre_px)
+        return at_least(scene, config.min_objects), unexplained
+    view = None if detections is None else _view(bundle, detections, objects, mounting, config)
+    odometry = None if bundle.odometry is None else bundle.odometry.odom_from_base
+    if cloud is not None and cloud.stamp_ns == objects.stamp_ns:
+        return fusers.clouds.add(cloud, detections, view, odometry)
+    scene, unexplained = fusers.planar.add(objects, detections, view, odometry)
+    return at_least(scene, config.min_objects), unexplained
 
 
 def _view(
@@ -93,7 +116,7 @@ def _camera(info: CameraInfo, config: FuseConfig) -> CameraModel:
 
 STAGE = Stage(
     "fuse",
-    reads=(SCAN_OBJECTS, DETECTIONS, CAMERA_INFO, TF_STATIC, ODOMETRY),
+    reads=(SCAN_OBJECTS, CLUSTERED_CLOUD, DETECTIONS, CAMERA_INFO, TF_STATIC, ODOMETRY),
     writes=(SCENE_OBJECTS, SCENE_MARKERS),
     config=FuseConfig,
     process=process,
