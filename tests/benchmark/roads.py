@@ -1,0 +1,61 @@
+"""How well camera and 3-D LiDAR on roads become scene objects: KITTI frames of the development set, stock YOLOv5n.
+
+python -m tests.benchmark.roads [--json] [--quick]
+"""
+
+import sys
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from tests.benchmark.rows import Row, main
+from tests.real import roads
+from tests.real.roads_judge import Judged, judge_frames
+from tests.shared import data_folder
+
+BANDS_M = ((0, 10), (10, 20), (20, 30), (30, 1000))
+GOALS = {"became": 50 / 60, "median": 0.22, "within": 42 / 60, "wrong": 0.20}
+"""What step 8 asks of other frames of KITTI, there of single ones."""
+
+
+def measure(quick: bool) -> Iterator[Row]:
+    """All rows: what was developed on, then what was held back."""
+    data = data_folder()
+    if data is None:
+        raise SystemExit("no data at ../shared/data; set MCAP_LANDMARKS_DATA to where it lies")
+    held = [number for number in roads.SINGLE if number not in roads.DEVELOPED_ON]
+    step = 6 if quick else 2
+    for label, numbers, drive in (
+        ("developed on", roads.DEVELOPED_ON, roads.DRIVE[::step]),
+        ("held back", held, roads.DRIVE[1::step]),
+    ):
+        single = judge_frames(data, roads.single_frames(data / "roads" / "kitti_object", numbers))
+        yield from rows(f"{label}, single frames", single, GOALS)
+        street = judge_frames(data, roads.drive_frames(data / "roads" / "kitti_tracking_0001", drive))
+        yield from rows(f"{label}, a street", street, {})
+
+
+def rows(label: str, judged: Judged, goals: Mapping[str, float]) -> Iterator[Row]:
+    """The figures of some frames, altogether and by range."""
+    yield from _band(f"{label}, all", judged, goals)
+    for low, high in BANDS_M:
+        name = f"{label}, {low} to {high} m" if high < 1000 else f"{label}, over {low} m"
+        yield from _band(name, judged.between(low, high), {})
+    wrong = len(judged.wrong) / max(judged.objects, 1)
+    yield Row(f"{label}, wrong share", wrong, at_most=goals.get("wrong"), cases=judged.objects)
+    yield Row(f"{label}, NEES / 2", judged.nees / 2, cases=len(judged.errors_m))
+
+
+def _band(label: str, judged: Judged, goals: Mapping[str, float]) -> Iterator[Row]:
+    errors, detected = judged.errors_m, len(judged.cases)
+    peers = {"became": float(len(errors)), "wrong": float(len(judged.wrong))}
+    share = len(errors) / detected if detected else np.nan
+    within = judged.within(0.5) / detected if detected else np.nan
+    median = float(np.median(errors)) if len(errors) else np.nan
+    yield Row(f"{label}: detected that became objects", share, "", goals.get("became"), cases=detected, peers=peers)
+    yield Row(f"{label}: median off", median, "m", at_most=goals.get("median"), cases=len(errors))
+    yield Row(f"{label}: detected within 0.5 m", within, "", goals.get("within"), cases=detected)
+
+
+if __name__ == "__main__":
+    sys.exit(main(measure, "How well camera and 3-D LiDAR on roads become scene objects."))
