@@ -80,7 +80,7 @@ def _row(sample: Sample, outcomes: Kept, seed: int) -> Row:
     for mutant in sorted(survivors, key=lambda survivor: (survivor.file, survivor.start)):
         _say(f"  {mutant}")
     share = 1 - counts[SURVIVED] / len(became)
-    peers = {"timed out": counts[TIMED_OUT], "of mutants": sample.of, "seed": seed}
+    peers: dict[str, float] = {"timed out": counts[TIMED_OUT], "of mutants": sample.of, "seed": seed}
     return Row(f"killed_{sample.package}", share, at_least=_GOAL, cases=len(became), peers=peers)
 
 
