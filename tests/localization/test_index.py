@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap_landmarks.localization.index import MapIndex, side_lengths
+from mcap_landmarks.localization.index import MapIndex, first_corner, side_lengths
 from mcap_landmarks.maps import database
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.maps.neighbours import Neighbours
@@ -90,3 +90,51 @@ def test_neighbours_that_do_not_fit_are_left_alone(
         connection.execute("DROP TABLE search_index")  # as in a database of an older version
     connection.close()
     assert database.read_neighbours(changed, landmark_map) is None
+
+
+def test_groups_come_in_the_order_of_the_query(landmark_map: LandmarkMap) -> None:
+    """Classes and sides of what is found are those that were asked for, corner by corner."""
+    index = MapIndex.build(landmark_map)
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        corners = index.triangles[rng.integers(len(index.triangles))].astype(np.int64)
+        corners = np.roll(corners, rng.integers(3))
+        sides = side_lengths(index.positions_xy[corners])
+        found = index.find_triangles(sides[None], index.class_of[corners][None], np.array([0.01])).landmarks
+        assert corners.tolist() in found.tolist()
+        for hit in found:
+            np.testing.assert_array_equal(index.class_of[hit], index.class_of[corners])
+            np.testing.assert_allclose(side_lengths(index.positions_xy[hit]), sides, atol=0.01)
+        pair = rng.permutation(index.pairs[rng.integers(len(index.pairs))].astype(np.int64))
+        length = side_lengths(index.positions_xy[pair])[:1]
+        found = index.find_pairs(length, index.class_of[pair][None], np.array([0.01]), 10**6).landmarks
+        assert pair.tolist() in found.tolist()
+        for hit in found:
+            np.testing.assert_array_equal(index.class_of[hit], index.class_of[pair])
+
+
+def test_several_queries_at_once_are_told_apart(landmark_map: LandmarkMap) -> None:
+    index = MapIndex.build(landmark_map)
+    corners = index.triangles[[3, 50, 400]].astype(np.int64)
+    sides, classes = side_lengths(index.positions_xy[corners]), index.class_of[corners]
+    hits = index.find_triangles(sides, classes, np.full(3, 0.01))
+    for number in range(3):
+        assert corners[number].tolist() in hits.landmarks[hits.query == number].tolist()
+    unknown = index.find_triangles(sides[:1] + 1e3, classes[:1], np.array([0.01]))
+    assert len(unknown.query) == 0
+
+
+def test_what_the_index_knows_of_the_map(landmark_map: LandmarkMap) -> None:
+    index = MapIndex.build(landmark_map)
+    apart = np.linalg.norm(index.positions_xy[:, None] - index.positions_xy, axis=-1)
+    assert index.extent_m[0] == pytest.approx(apart[apart > 0].min(), rel=1e-12)
+    assert index.extent_m[1] == pytest.approx(np.linalg.norm(np.ptp(index.positions_xy, axis=0)), rel=1e-12)
+    assert index.class_pair_count == 6  # of three classes, each with itself as well
+    assert (len(index), index.small) == (18, True)
+    some = dataclasses.replace(landmark_map, tentative=np.arange(18) % 3 == 0)
+    np.testing.assert_array_equal(MapIndex.build(some).rows, np.flatnonzero(np.arange(18) % 3))
+
+
+def test_the_first_corner_is_that_from_which_classes_read_lowest() -> None:
+    classes = np.array([[0, 1, 2], [2, 0, 1], [1, 2, 0], [1, 1, 0], [0, 0, 0]])
+    np.testing.assert_array_equal(first_corner(classes, 3), [0, 1, 2, 2, 0])

@@ -170,3 +170,27 @@ def test_no_more_objects_are_kept_than_are_matched_the_latest_and_most_observed(
     numbers = observe(local_map, *((4.0 * i, 50.0, SURE) for i in range(10)))
     assert len(local_map) == 24
     assert set(numbers.tolist()) <= set(local_map.numbers.tolist())
+
+
+def test_what_was_observed_twice_is_an_object() -> None:
+    local_map = empty()
+    for y in (8.0, -8.0, 16.0):
+        observe(local_map, (0.0, y, SURE))
+    twice = observe(local_map, (0.0, 16.0, SURE))
+    assert local_map.spurious_of(twice) == pytest.approx(CONFIG.spurious, rel=1e-12)
+    assert local_map.spurious.max() > 2 * CONFIG.spurious
+
+
+def test_one_object_counts_for_one_that_is_known() -> None:
+    """Of two beside each other only the nearer is observed again."""
+    local_map = empty()
+    observe(local_map, (5.0, 0.0, SURE), (5.04, 0.0, SURE))
+    assert observe(local_map, (5.0, 0.0, SURE)) == [0]
+    np.testing.assert_array_equal(local_map.observations, [2, 1])
+
+
+def test_the_classes_of_the_surest_object_are_averaged() -> None:
+    local_map = empty()
+    for seen in (SURE, SURE, LIKELY):
+        observe(local_map, (5.0, 0.0, seen))
+    np.testing.assert_allclose(local_map._called[0], (2 * SURE + LIKELY) / 3, rtol=1e-12)

@@ -123,3 +123,38 @@ def test_of_many_objects_those_of_a_sector_and_near_ones_tell_it(count: int) -> 
     moved = SceneObjects(0, "base", scene.ids, scene.hypotheses, points, scene.covariances, scene.radii_m)
     candidates, sets, fresh = looked_up(matcher(world), moved)
     assert is_found(candidates.triangles(sets, fresh).pose, np.array([6.0, 6.0, 0.7]))
+
+
+def test_how_well_a_group_tells_the_heading() -> None:
+    """The spread of its objects against their errors and the map's."""
+    candidates, sets, _ = looked_up(matcher(WORLD), seen(WORLD, POSE, range(3)))
+    points = PLACE_XY[:3] - PLACE_XY[:3].mean(axis=0)
+    sigma = candidates._heading_sigma(sets, np.zeros(1, dtype=np.int64), np.array([[0, 1, 2]]))
+    assert sigma[0] == pytest.approx(np.sqrt((0.03**2 + 0.03**2) / (points**2).sum()), rel=1e-9)
+
+
+def test_sides_and_how_well_they_are_known() -> None:
+    """Against drawn errors of objects and landmarks, which two sides share where they meet."""
+    candidates, sets, _ = looked_up(matcher(WORLD), seen(WORLD, POSE, range(3)))
+    of = np.zeros(1, dtype=np.int64)
+    queries = candidates._classes(sets, of, np.array([[0, 1, 2]]))
+    sides, spread = candidates._sides(sets, queries)
+    rng = np.random.default_rng(0)
+    drawn = PLACE_XY[:3] + np.hypot(0.03, 0.03) * rng.normal(size=(20_000, 3, 2))
+    lengths = np.linalg.norm(np.roll(drawn, -1, axis=1) - drawn, axis=-1)
+    np.testing.assert_allclose(sides[0], np.linalg.norm(np.roll(PLACE_XY[:3], -1, axis=0) - PLACE_XY[:3], axis=-1))
+    np.testing.assert_allclose(spread[0], np.cov(lengths.T), atol=0.04 * spread[0].max())
+
+
+def test_a_pair_that_fits_nearly_everywhere_is_not_looked_up() -> None:
+    """A row of the same at every metre: a metre apart are 600 pairs, in both orders."""
+    row = landmark_map(np.column_stack([np.arange(601.0), np.zeros(601)]), ("bench",) * 601)
+    candidates, sets, fresh = looked_up(matcher(row), seen(row, np.array([3.0, -3.0, 1.0]), [5, 6]))
+    assert len(candidates.pairs(sets, fresh).of) == 0
+
+
+def test_poses_alike_are_tried_once() -> None:
+    candidates, sets, fresh = looked_up(matcher(WORLD), seen(WORLD, POSE, range(5)))
+    found = candidates.triangles(sets, fresh)
+    near = np.abs(between(POSE, found.pose)) < [0.05, 0.05, 0.02]
+    assert 1 <= near.all(axis=1).sum() <= 3  # ten triangles tell it; rounding may part them

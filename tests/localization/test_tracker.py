@@ -148,7 +148,7 @@ def test_a_place_that_is_likelier_wrong_is_lost(odds: float, lost: bool) -> None
 def test_a_position_among_more_than_one_landmark_by_chance_is_lost(sigma_m: float, lost: bool) -> None:
     """In a map of a landmark on each ten square metres: 2 pi 1.26^2 of them."""
     crowded = matcher(WORLD)
-    crowded.density = PairDensity(np.log([1.0, 100.0]), np.log([0.1, 0.1]))
+    crowded.density = PairDensity(np.log([1.0, 10.0, 100.0]), np.log([9.0, 9.0, 0.1]))
     fix = Fix(POSE, SURE, np.array(ALL), 1e-9, 1.0, 7)
     track = Tracker(crowded, fix, transform_points(inverse(POSE), WORLD.positions_xy[:5]), 30.0)
     track.predict(np.zeros(3), np.diag([sigma_m**2, sigma_m**2, 0.0]), 0.0)
@@ -207,3 +207,47 @@ def test_a_fix_tells_how_well_the_bundle_fits() -> None:
     assert (exact.dof, bad.dof) == (10, 10)
     variance = SIGMA_M**2 + LocalizeConfig().map_sigma_m ** 2
     assert bad.chi2 == pytest.approx(0.06**2 / variance, rel=0.01)
+
+
+@pytest.mark.parametrize(("bundles", "lost"), [(4, False), (5, True)])
+def test_eight_more_objects_that_match_nothing_are_not_yet_too_many(bundles: int, lost: bool) -> None:
+    track = tracker()
+    for _ in range(bundles):
+        update(track, replace(seen(WORLD, POSE, range(2)), positions_xy=UNKNOWN.positions_xy[:2]))
+    assert track.lost is lost
+
+
+def test_what_matches_makes_up_for_what_does_not() -> None:
+    track = tracker()
+    for _ in range(2):
+        update(track, UNKNOWN)
+        update(track, seen(WORLD, POSE, ALL))
+    assert track._astray == 0
+    update(track, with_stray(seen(WORLD, POSE, range(1)), np.array([3.0, 8.0])))
+    assert track._astray == 0
+
+
+@pytest.mark.parametrize(("sigmas", "observations"), [(2.9, 3), (3.1, 1)])
+def test_an_unmapped_object_is_known_again_within_three_sigmas(sigmas: float, observations: int) -> None:
+    track = tracker(SURE / 1e4, rows=range(3))
+    place = np.array([3.0, 8.0])
+    for _ in range(2):
+        update(track, with_stray(seen(WORLD, POSE, range(3)), place))
+    beside = place + np.array([sigmas * np.sqrt(2) * SIGMA_M, 0.0])
+    update(track, with_stray(seen(WORLD, POSE, range(3)), beside))
+    assert track._hypotheses[0].evidence.observations[-1] == observations
+
+
+def test_new_landmarks_speak_by_how_well_they_fit_against_how_many_are_expected_there() -> None:
+    """The gain of a fourth landmark, from its own density, class and probability of being in the map."""
+    track = tracker(SURE / 1e4, rows=range(3))
+    before = track._hypotheses[0].evidence.gain.sum()
+    update(track, seen(WORLD, POSE, range(4)))
+    evidence = track._hypotheses[0].evidence
+    variance = SIGMA_M**2 + LocalizeConfig().map_sigma_m ** 2
+    apart = np.linalg.norm(WORLD.positions_xy[3] - WORLD.positions_xy[:3], axis=1)
+    expected = MATCHER.density.at(apart).max()
+    number = MATCHER.index.class_of[3]
+    ratio = MATCHER.classes.log_ratios(MATCHER.classes.probabilities([((WORLD.classes[3], 1.0),)]))[0, number]
+    gain = -np.log(2 * np.pi * variance) + np.log(1 - LocalizeConfig().spurious) - expected + ratio
+    assert evidence.gain.sum() - before == pytest.approx(gain, rel=1e-3)

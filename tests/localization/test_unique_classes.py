@@ -186,3 +186,20 @@ def test_an_outlier_among_bearings_is_dropped_while_three_are_left() -> None:
 def test_two_ranges_or_bearings_are_too_few(sigmas: list[float]) -> None:
     (match,) = locate(polar_scene(POSE, sigmas, range(2)))
     assert match.message.status is Status.TOO_FEW_OBJECTS
+
+
+@pytest.mark.parametrize(("sigmas", "status"), [(2.9, Status.LOCALIZED), (3.1, Status.AMBIGUOUS)])
+def test_mirror_images_within_three_sigmas_are_one_position(sigmas: float, status: Status) -> None:
+    """Just beside the line of landmarks, both sides of it are the same."""
+    line = landmark_map([[-6.0, 0.0], [0.5, 0.0], [5.0, 0.0]], NAMES[:3])
+    # The sigma across the line grows as the robot nears it, and the mirror image is twice as far.
+    height = 1.0
+    for _ in range(30):
+        away = line.positions_xy - np.array([1.0, height])
+        away /= np.linalg.norm(away, axis=1, keepdims=True)
+        height = sigmas / 2 * np.sqrt(np.linalg.eigvalsh(np.linalg.inv(away.T @ away / 0.3**2))[-1])
+    points = line.positions_xy - np.array([1.0, height])
+    xy, spread = points_from_polar(np.hypot(*points.T), np.zeros(3), np.diag([0.3**2, 3.0**2]))
+    scene = replace(seen(line, POSE, range(3)), positions_xy=xy, covariances=spread)
+    (match,) = UniqueClassLocalizer(line, replace(CONFIG, max_sigma_m=5.0)).locate([scene])
+    assert match.message.status is status
