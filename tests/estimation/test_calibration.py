@@ -100,6 +100,11 @@ def test_a_model_must_explain_enough_to_be_believed(count: int, sigma_m: float, 
     assert (found(world).depth > 0.8) is is_told
 
 
+def test_bundles_of_two_landmarks_tell_a_number_each() -> None:
+    """Of the four of both ranges and bearings the pose takes three."""
+    assert found(by_camera(seen(600, 2))).depth == pytest.approx(1.0, abs=0.05)
+
+
 def test_sigmas_are_found() -> None:
     world = seen(600)
     model = found(world._replace(covariance=world.covariance * np.outer([2, 0.5], [2, 0.5])))

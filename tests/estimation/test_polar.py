@@ -22,6 +22,8 @@ def test_polar_sigmas_become_a_cloud_across_the_line_of_sight() -> None:
     point, covariance = points_from_polar(10.0, np.pi / 2, np.diag([0.12**2, 0.03**2]))
     np.testing.assert_allclose(point, [0, 10], atol=1e-12)
     np.testing.assert_allclose(covariance, np.diag([0.3**2, 0.12**2]), atol=1e-12)
+    points, _ = points_from_polar([1.0, 2.0, 3.0], [0.0, np.pi / 2, np.pi], np.eye(2))
+    np.testing.assert_allclose(points, [[1, 0], [0, 2], [-3, 0]], atol=1e-12)
     _, correlated = points_from_polar(2.0, 0.0, [[0.04, 0.01], [0.01, 0.09]])
     np.testing.assert_allclose(correlated, [[0.04, 0.02], [0.02, 0.36]])
 

@@ -1,14 +1,17 @@
-"""Made-up drives past landmarks, with drifting odometry and noisy sightings whose landmarks are known."""
+"""Made-up drives past landmarks, with drifting odometry and noisy observations whose landmarks are known."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, motion_covariance
+from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, dead_reckoning, motion_covariance
+from mcap_landmarks.estimation.polar import points_from_polar
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.mapping.log_graph import LandmarkObservations
+from mcap_landmarks.mapping.observations import LogObservations
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+SMALL_ROBOT = OdometryNoise(0.02, 0.009, 0.02)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +39,7 @@ def drive(
     laps: float = 1.2,
     start_rad: float = 0.0,
     step_m: float = 0.25,
-    odometry: OdometryNoise = OdometryNoise(0.02, 0.009, 0.02),  # noqa: B008 - frozen
+    odometry: OdometryNoise = SMALL_ROBOT,
     sigma_range_m: float = 0.03,
     sigma_bearing_rad: float = 0.01,
 ) -> Drive:
@@ -59,9 +62,31 @@ def drive(
 
 
 def with_wrong_landmarks(given: Drive, share: float, seed: int) -> Drive:
-    """The same drive with a share of its sightings given to other landmarks."""
+    """The same drive with a share of its observations given to other landmarks."""
     rng = np.random.default_rng(seed)
     landmark = given.log.landmark.copy()
     wrong = rng.random(len(landmark)) < share
     landmark[wrong] = rng.integers(0, len(given.landmarks_xy), wrong.sum())
     return replace(given, log=replace(given.log, landmark=landmark))
+
+
+def as_observed(
+    given: Drive, classes: tuple[str, ...], fingerprint: str = "made up", radius_m: float = 0.2
+) -> LogObservations:
+    """The drive as its log tells of it: objects of classes, without the numbers of their landmarks."""
+    log, count = given.log, len(given.log)
+    points, covariances = points_from_polar(log.range_m, log.bearing_rad, log.covariance)
+    return LogObservations(
+        1_000 * np.arange(count),
+        1_000 * np.arange(count) + 1,
+        dead_reckoning(log.start, log.motions),
+        np.concatenate([[0.0], np.cumsum(log.motions.distance_m)]),
+        np.concatenate([[0.0], np.cumsum(log.motions.turn_rad)]),
+        log.pose,
+        tuple(classes[i] for i in log.landmark),
+        points,
+        covariances,
+        np.full(len(points), radius_m),
+        count + 5,
+        fingerprint,
+    )

@@ -17,7 +17,7 @@ _FITTING = 3.0
 
 
 def align(points_xy: Array, onto_xy: Array, seed: int = 0) -> Array:
-    """Transform (3,) that brings points (N, 2) onto others (N, 2), N >= 2, right as long as more than half of them fit.
+    """Transform (3,) that brings points (N, 2) onto others (N, 2), N >= 2; right if two more than half of them fit.
 
     Least median of squares (Rousseeuw 1984): of transforms by two points each, the one with the least median distance;
     then the best one (Procrustes; Umeyama 1991) of all points within three times that.
