@@ -11,7 +11,7 @@ from mcap_landmarks.mapping.common_frame import align
 from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.landmark_slam import solve_jointly
 from mcap_landmarks.mapping.observations import LogObservations
-from mcap_landmarks.maps.model import LandmarkMap, Source
+from mcap_landmarks.maps.model import LandmarkMap, MapSource
 
 from tests.mapping.drives import Drive, as_observed, drive, landmarks_beside
 
@@ -131,7 +131,7 @@ def prior(built: BuiltMap) -> LandmarkMap:
         tentative=tentative,
         radii_m=radii,
         sightings=np.full(len(kept), 100),
-        sources=(Source("import", "surveyed"),),
+        sources=(MapSource("import", "surveyed"),),
     )
 
 
