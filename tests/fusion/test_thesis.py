@@ -16,7 +16,7 @@ CENTRE_PX = 320.5
 
 def test_boxes_and_objects_pair_from_left_to_right() -> None:
     """Whatever their order, and wherever they are about the middle of the image."""
-    for names in (FOUR[:3], FOUR[1:], (FOUR[0], FOUR[1], FOUR[3])):
+    for names in (FOUR[:3], FOUR[1:], (FOUR[1], FOUR[3], FOUR[0]), FOUR[2::-1]):
         objects = scanned(names, 5)
         for order in ([0, 1, 2], [2, 0, 1], [1, 2, 0], [2, 1, 0]):
             given = detected([names[i].name for i in order], boxes([names[i] for i in order]), 5)

@@ -46,6 +46,7 @@ def test_a_look_from_another_side_or_distance_is_new() -> None:
     assert fresh((5.0, 0.3, 0.0), (5.0 * np.exp(-0.05), 0.314, 0.0)) == pytest.approx(0.9)
     assert fresh((5.0, 0.3, 0.0), (7.0, 0.5, 0.0)) == 1
     assert fresh((0.001, 0.3, 0.0), (0.1, 0.3, 0.0)) == 0.15  # so near that distances say nothing
+    assert fresh((0.001, 0.3, 0.0), (0.1 * np.exp(0.05), 0.3, 0.0)) == pytest.approx(0.5)
 
 
 def test_tracks_are_numbered_as_they_come_and_keep_their_number() -> None:
