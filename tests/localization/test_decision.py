@@ -17,7 +17,7 @@ from tests.stages.worlds import ring
 CONFIG = LocalizeConfig()
 SURE = np.diag([0.1**2, 0.1**2, 0.01**2])
 VAGUE_PLACE, VAGUE_HEADING = np.diag([0.6**2, 0.1**2, 0.01**2]), np.diag([0.1**2, 0.1**2, 0.2**2])
-OPEN = np.diag([np.inf, np.inf, np.inf])
+OPEN, HALF_OPEN = np.diag([np.inf, np.inf, np.inf]), np.diag([np.inf, 0.1**2, 0.01**2])
 
 
 @pytest.mark.parametrize(
@@ -33,6 +33,7 @@ OPEN = np.diag([np.inf, np.inf, np.inf])
         ((4, 4, 4, 1e-9, VAGUE_PLACE), Status.WEAK_GEOMETRY, ["position_sigma_m"]),
         ((4, 4, 4, 1e-9, VAGUE_HEADING), Status.WEAK_GEOMETRY, ["heading_sigma_deg"]),
         ((4, 4, 4, 1e-9, OPEN), Status.WEAK_GEOMETRY, ["position_sigma_m", "heading_sigma_deg"]),
+        ((4, 4, 4, 1e-9, HALF_OPEN), Status.WEAK_GEOMETRY, ["position_sigma_m", "heading_sigma_deg"]),
         (
             (1, 1, 1, 1.0, OPEN),
             Status.TOO_FEW_OBJECTS,

@@ -65,6 +65,14 @@ def test_what_lies_elsewhere_stays_unmatched_and_what_was_misread_does_not() -> 
     np.testing.assert_array_equal(fits.candidates.landmarks, [[0, 1, N, 3, 4]])
 
 
+def test_the_gate_counts_the_errors_of_the_map_too() -> None:
+    """Four sigmas of the object, and not three of object and landmark together."""
+    off = np.zeros((5, 2))
+    off[4] = [4 * SIGMA_M, 0.0]
+    fits = MATCHER.verifier.fit(constellation(seen(WORLD, POSE, range(5), off)), start([0, 1, 2, 3, N]))
+    np.testing.assert_array_equal(fits.candidates.landmarks, [[0, 1, 2, 3, 4]])
+
+
 def test_the_nearer_of_two_objects_gets_the_landmark() -> None:
     scene = seen(WORLD, POSE, [0, 1, 2, 2], [[0, 0], [0, 0], [0.08, 0], [0.01, 0]])
     fits = MATCHER.verifier.fit(constellation(scene), start([0, 1, N, N]))
