@@ -5,12 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from mcap_landmarks.fusion.camera_view import CameraView
-from mcap_landmarks.fusion.cloud_fuser import CloudFuser
+from mcap_landmarks.fusion.cloud_fuser import CloudFuser, _distinct
+from mcap_landmarks.fusion.cloud_objects import FoundObject
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.lidar.config import ClusterConfig
+from mcap_landmarks.lidar.rectangles import Rectangle
 from mcap_landmarks.lidar.whole_clouds import whole_cloud
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.detections import Detections
@@ -43,8 +45,10 @@ def detections(told: Sequence[Told]) -> Detections:
     return Detections(1, "camera", ("",) * len(told), tuple(((name, score),) for name, score, _ in told), boxes)
 
 
-def clustered(solids: Sequence[Solid], stamp_ns: int = 10**9) -> ClusteredCloud:
-    points, _ = cloud(solids, AHEAD)
+def clustered(
+    solids: Sequence[Solid], stamp_ns: int = 10**9, slope: tuple[float, float] = (0.0, 0.0)
+) -> ClusteredCloud:
+    points, _ = cloud(solids, AHEAD, slope)
     found = whole_cloud(points, np.zeros(2), ClusterConfig())
     return ClusteredCloud(stamp_ns, "base_link", found.points_m, found.heights_m, found.clusters)
 
@@ -144,3 +148,33 @@ def test_lamps_under_the_ceiling_are_nothing() -> None:
     for name in ("boat", "car"):
         scene, unexplained = fused([(name, 0.45, lamp)], [lamp])
         assert (len(scene), unexplained) == (0, 1)
+
+
+def test_what_only_the_camera_places_stands_on_the_sloping_ground_as_tall_as_its_class() -> None:
+    slope, far = 0.04, Solid(14.0, 2.0, 0.4, 0.4, 1.7, above_m=0.04 * 14.0)
+    view = CameraView.at(CAMERA, BASE_FROM_CAMERA, np.zeros(3), 0.0)
+    beside = [Solid(24.0, 5.0, 1.0, 1.0, 1.5), Solid(34.0, 3.0, 1.0, 1.0, 1.5), Solid(8.0, 1.9, 0.6, 0.6, 1.0)]
+    ground = clustered(beside, slope=(slope, 0.0))
+    scene, unexplained = CloudFuser(FuseConfig()).add(ground, detections([("person", 0.8, far)]), view, None)
+    assert (scene.classes, unexplained) == (("person",), 0)
+    assert scene.boxes is not None
+    tall = scene.boxes.sizes_m[0, 2]
+    assert tall == pytest.approx(1.725)  # between a person's least and greatest height
+    foot = scene.boxes.centres_m[0, 2] - tall / 2
+    assert foot == pytest.approx(slope * scene.positions_xy[0, 0], abs=0.1)
+
+
+def test_something_round_is_surer_across_the_view_than_along_it() -> None:
+    scene, _ = fused([("person", 0.7, PERSON)], [PERSON])
+    across, along = np.linalg.eigvalsh(scene.covariances[0])
+    assert np.sqrt(across) == pytest.approx(0.1)
+    assert np.sqrt(along - across) == pytest.approx(scene.radii_m[0] / 2)
+
+
+def test_of_two_objects_in_one_place_the_one_with_points_stays() -> None:
+    def found(box: int, score: float, points: int) -> FoundObject:
+        return FoundObject(box, score, Rectangle(np.array([9.0, 1.0]), 1.0, 1.0, 0.0, np.eye(2)), np.arange(points))
+
+    by_camera, weak, strong = found(0, 0.9, 0), found(1, 0.4, 1), found(2, 0.6, 30)
+    assert _distinct([by_camera, weak]) == [weak]
+    assert _distinct([by_camera, weak, strong]) == [strong]
