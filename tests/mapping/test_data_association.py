@@ -82,6 +82,9 @@ def test_pairs_must_fit_together_and_the_one_that_spoils_the_fit_leaves() -> Non
 
 
 def test_the_evidence_is_the_density_of_what_was_foreseen_and_a_hundred_metres_square_for_the_rest() -> None:
+    fresh = LandmarkFilter(ORIGIN, GATES)
+    see(fresh, (5.0, 0.0))
+    assert fresh.log_evidence == pytest.approx(-np.log(1e4))
     state = started((5.0, 0.0), (0.0, 5.0))
     see(state, (5.1, 0.2), (0.0, 4.9), (-20.0, 0.0))
     spread = 2 * SIGMA_M**2 * np.eye(4)

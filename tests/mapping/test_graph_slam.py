@@ -1,12 +1,15 @@
 """Maps from drives whose truth is known: accuracy, honesty, wrong observations, several logs, known landmarks."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from mcap_landmarks.errors import MapError
+from mcap_landmarks.estimation.factor_graph import GraphSolution, minimise
 from mcap_landmarks.estimation.odometry import OdometryNoise, dead_reckoning
 from mcap_landmarks.geometry import se2
+from mcap_landmarks.mapping import graph_slam
 from mcap_landmarks.mapping.common_frame import align
 from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.graph_slam import KnownLandmarks, MapSolution, solve_map
@@ -82,13 +85,13 @@ def test_covariances_are_honest_where_odometry_is_as_it_is_assumed(
 
 @pytest.mark.slow
 def test_covariances_of_hundreds_of_landmarks_are_honest() -> None:
-    assert 0.85 <= nees(range(60), CONFIG, OdometryNoise()) <= 1.15
+    assert 0.85 <= nees(range(25), CONFIG, OdometryNoise()) <= 1.15
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="two rounds find half of it: 2.7 where odometry is twice as bad as assumed", strict=True)
+@pytest.mark.xfail(reason="two rounds find a quarter of it: 2.6 where odometry is twice as bad as assumed", strict=True)
 def test_covariances_are_honest_where_odometry_is_worse_than_assumed() -> None:
-    assert 0.8 <= nees(range(20), CONFIG, OdometryNoise(0.1, 0.1, 0.2)) <= 1.25
+    assert 0.8 <= nees(range(8), CONFIG, OdometryNoise(0.1, 0.1, 0.2)) <= 1.25
 
 
 def test_wrong_observations_hardly_matter_and_lose_their_weight() -> None:
@@ -130,6 +133,9 @@ def test_chi2_is_that_of_the_whitened_residuals_and_their_weights() -> None:
     assert plain.chi2 == pytest.approx(plain.termination.cost, rel=1e-6)
     robust = solve_map([given.log], RIGHT)
     assert robust.chi2 < 0.9 * robust.termination.cost
+    known = KnownLandmarks(np.arange(3), given.landmarks_xy[:3] + 0.2, np.tile(1e-4 * np.eye(2), (3, 1, 1)))
+    bent = solve_map([given.log], replace(RIGHT, robust_dof=1e9), known)
+    assert bent.chi2 == pytest.approx(bent.termination.cost, rel=1e-6)
 
 
 def test_the_same_place_twice_is_better_known_than_once() -> None:
@@ -237,3 +243,18 @@ def test_the_iterations_are_those_of_the_solution_that_took_most() -> None:
     assert 1 < free.iterations < 50
     limited = solve_map([given.log], replace(CONFIG, max_iterations=free.iterations)).termination
     assert limited == free
+
+
+def test_the_iterations_of_several_logs_are_those_of_any_solution_on_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken = []
+
+    def heard(*arguments: Any) -> GraphSolution:  # noqa: ANN401 - whatever it takes
+        taken.append(minimise(*arguments))
+        return taken[-1]
+
+    monkeypatch.setattr(graph_slam, "minimise", heard)
+    first, second = loop(1, laps=0.4), loop(1, laps=0.4, start_rad=0.4)
+    together = solve_map([first.log, second.log], CONFIG)
+    assert [together.termination.cost] == [taken[1].termination.cost]
+    alone = [solve_map([log], CONFIG).termination.iterations for log in (first.log, second.log)]
+    assert together.termination.iterations == max(*alone, *(solved.termination.iterations for solved in taken[:2]))
