@@ -18,3 +18,5 @@ def test_objects_are_ordered_from_left_to_right() -> None:
     assert left_to_right(ahead).tolist() == [1, 2, 0]
     behind = np.array([[-4.0, 1.0], [-4.0, -0.5], [-4.0, 2.0]])  # their bearings are on both sides of 180 degrees
     assert left_to_right(behind).tolist() == [1, 0, 2]
+    aside = np.array([[-1.7, -1.0], [-1.0, -1.7], [-1.2, -1.2]])  # behind to the right, as seen when looking there
+    assert left_to_right(aside).tolist() == [1, 2, 0]
