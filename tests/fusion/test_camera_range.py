@@ -34,7 +34,9 @@ def test_the_height_of_a_class_is_that_of_its_cuboid_or_between_its_limits() -> 
 def test_the_ground_in_one_direction_is_that_of_the_points_there_also_across_the_half_turn() -> None:
     away = np.linspace(5.0, 45.0, 400)
     bearings = np.repeat([np.pi - 0.01, -np.pi + 0.01, 0.0, 0.5], 100)
-    floors = np.where(np.abs(bearings) > 3.0, 0.5, 2.0)
+    floors = np.select(
+        [bearings > 3.0, bearings < -3.0], [0.4, 0.6], 2.0
+    )  # half a metre on both sides of the half turn
     nothing = np.zeros((400, 2))
     view = CloudView(nothing, floors, floors, np.zeros(400, np.int32), nothing, np.tile(away[::4], 4), bearings)
     assert floor_along(view, np.pi) == (pytest.approx(0.5), pytest.approx(0.0))
