@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry import se2
+from mcap_landmarks.mapping import landmark_slam
 from mcap_landmarks.mapping.built_map import BuiltMap
 from mcap_landmarks.mapping.common_frame import align
 from mcap_landmarks.mapping.config import BuildMapConfig
@@ -189,3 +190,9 @@ def test_what_was_seen_too_seldom_is_tentative() -> None:
     everything = solve_jointly([short], None, replace(CONFIG, min_sightings=10_000)).landmark_map
     assert everything.tentative.all()
     assert everything.groups == ()
+
+
+def test_covariances_are_the_solutions_made_symmetric_and_kept_from_zero() -> None:
+    uneven = np.array([[[0.04, 0.01], [0.03, 0.09]], [[0.0, 0.0], [0.0, 0.0]]])
+    expected = [[[0.04 + 1e-10, 0.02], [0.02, 0.09 + 1e-10]], [[1e-10, 0.0], [0.0, 1e-10]]]
+    np.testing.assert_allclose(landmark_slam._definite(uneven), expected, rtol=1e-12)
