@@ -11,11 +11,12 @@ from mcap.writer import Writer as McapWriter
 from mcap_landmarks.channels import MAP, ODOMETRY, POSE, SCENE_OBJECTS, TF_STATIC, TRUTH_POSE
 from mcap_landmarks.cli.console import DONE, PARTIAL, UNUSABLE, run_command
 from mcap_landmarks.cli.main import build
+from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.poses import Odometry, PoseStamped
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.resources import resource
-from mcap_landmarks.stage import Stamped
+from mcap_landmarks.stage import Channel, Stamped
 
 from tests.cli.logs import write
 from tests.runs.chain import raw_log, raw_messages
@@ -166,3 +167,11 @@ def test_findings_are_told_with_what_to_do(tmp_path: Path, capsys: pytest.Captur
     assert "problem: /scan: there are no transforms: nothing says where the LiDAR (base_scan) sits" in said
     assert "problem: /camera/camera_info: no transforms lead from camera to base_scan; record /tf_static" in said
     assert "warning: there is no odometry" in said
+
+
+def test_a_cloud_that_could_be_the_scan_is_named_with_the_option_that_takes_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cloud = PointCloud2(SECOND, "laser", np.ones((3, 3), dtype=np.float32))
+    assert run(write(tmp_path / "cloud.mcap", [Stamped(Channel("/points", PointCloud2), SECOND, cloud)])) == DONE
+    assert "cluster lacks: scan (/points could be it, choose with --scan-from TOPIC)\n" in capsys.readouterr().out

@@ -101,7 +101,8 @@ def _print_verbs(log: "LogInfo") -> None:
     if log.verbs:
         say(f"ready for: {', '.join(log.verbs)}")
     for verb, roles in log.missing.items():
-        say(f"{verb} lacks: {', '.join(roles)}")
+        lacks = [f"{role} ({log.hints[role]})" if role in log.hints else role for role in roles]
+        say(f"{verb} lacks: {', '.join(lacks)}")
 
 
 def _print_findings(log: "LogInfo") -> None:

@@ -10,7 +10,7 @@ from mcap_landmarks.config import Settings
 from mcap_landmarks.inspection.checks import Finding, check
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog, open_logs
 from mcap_landmarks.inspection.survey import survey
-from mcap_landmarks.inspection.topic_roles import ROLES, topics_for
+from mcap_landmarks.inspection.topic_roles import ROLES, could_be, topics_for
 from mcap_landmarks.locations import Location
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.sources import Log
@@ -45,7 +45,10 @@ class ChannelInfo:
 
 @dataclass(frozen=True, slots=True)
 class LogInfo:
-    """One log. `name` tells the logs of one path apart, `roles` are topics by role, `missing` roles by verb."""
+    """One log. `name` tells the logs of one path apart, `roles` are topics by role, `missing` roles by verb.
+
+    `hints` tells for roles that are missing which topics could play them, and how to choose one.
+    """
 
     path: Path
     name: str
@@ -56,6 +59,7 @@ class LogInfo:
     roles: Mapping[str, list[str]]
     verbs: tuple[str, ...]
     missing: Mapping[str, list[str]]
+    hints: Mapping[str, str]
     losses: tuple[str, ...] = field(default=())
     findings: tuple[Finding, ...] | None = None
 
@@ -105,6 +109,7 @@ def _describe(log: OpenLog, profile: str, parts: Sequence[Log | Recording], loss
         {role: topics for role, topics in roles.items() if role != RESULTS},
         tuple(verb for verb, lacks in missing.items() if not lacks),
         {verb: lacks for verb, lacks in missing.items() if lacks},
+        _hints(counts, roles),
         tuple(losses),
     )
 
@@ -135,6 +140,12 @@ def _missing(roles: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
     if there.issuperset(_SOURCES):
         there.add("scene_objects")
     return {verb: [role for role in needs if role not in there] for verb, needs in NEEDS.items()}
+
+
+def _hints(present: Collection[tuple[str, str]], roles: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """For each role that no topic plays, which ones a user could choose for it."""
+    lacking = {role.name: could_be(present, channel) for channel, role in ROLES.items() if not roles.get(role.name)}
+    return {role: hint for role, hint in lacking.items() if hint}
 
 
 def _roles(present: Collection[tuple[str, str]]) -> dict[str, list[str]]:

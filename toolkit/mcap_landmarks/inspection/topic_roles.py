@@ -1,6 +1,6 @@
 """Which topics of a recording play which role: found by message type, or chosen by the user."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from mcap_landmarks import channels
@@ -83,13 +83,13 @@ def _of_types(present: Collection[tuple[str, str]], types: Collection[str]) -> l
     return sorted({topic for topic, ros_type in present if ros_type in types})
 
 
-def could_be(recording: Readable, channel: Channel[Message]) -> str:
-    """Which topics a user could choose as a channel that none is by itself, and how; empty if there are none."""
+def could_be(present: Iterable[tuple[str, str]], channel: Channel[Message]) -> str:
+    """Which topics, of (topic, message type), a user could choose as a channel that none is by itself; empty if none."""
     role = ROLES.get(channel)
     if role is None:
         return ""
     others = {message.ROS_TYPE for message in role.others}
-    topics = [entry.connection.topic for entry in recording.channels if entry.connection.message_type in others]
+    topics = [topic for topic, ros_type in present if ros_type in others]
     recorded = {topic for topic in topics if not topic.startswith((channels.RESULTS, channels.TRUTH))}
     fitting = sorted(topic for topic in recorded if not topic.endswith("_static"))
     how = "--scan-from TOPIC" if channel == channels.SCAN else f"{role.option} TOPIC"

@@ -101,8 +101,9 @@ def _missing(recording: Readable, channel: Channel[Message], empty: bool) -> str
             f"as it with --remap TOPIC={channel.topic}"
         )
     types = " or ".join(role.types)
+    present = [(entry.connection.topic, entry.connection.message_type) for entry in recording.channels]
     remedy = f"choose a topic with {role.option}, or take a log that has one, such as {channel.topic}"
-    return f"{recording.path}: there is no {role.name} ({types}); {could_be(recording, channel) or remedy}"
+    return f"{recording.path}: there is no {role.name} ({types}); {could_be(present, channel) or remedy}"
 
 
 def read_bundles(

@@ -68,7 +68,8 @@ class _LackingError(RecordingError):
             f"choose topics with --remap or {ROLES[first].option if first in ROLES else '--remap'}, or take a log "
             "that has one of them"
         )
-        hints = [hint for source in sources if (hint := could_be(own, source))]
+        present = [(entry.connection.topic, entry.connection.message_type) for entry in own.channels]
+        hints = [hint for source in sources if (hint := could_be(present, source))]
         super().__init__(
             f"{log.path}: there is no {_name(channel)}, and no {' or '.join(map(_name, sources))} to make it from; "
             f"{'; '.join(hints) or remedy}"
