@@ -46,6 +46,8 @@ class Thing:
 
 
 THREE = (Thing("fire hydrant", 5.0, 1.0), Thing("person", 6.0, -0.2), Thing("suitcase", 4.0, -1.2))
+NAMES = [thing.name for thing in THREE]
+SECOND = 10**9
 
 
 def mounted(camera_m: float = 0.2) -> TFMessage:
@@ -160,3 +162,14 @@ def fused(
     results = list(process(bundles, config or FuseConfig(), resources or {}))
     scenes = [entry.message for entry in results if not isinstance(entry, Omission) and entry.channel == SCENE_OBJECTS]
     return scenes, [entry.reason for entry in results if isinstance(entry, Omission)]
+
+
+def plain(stamp_ns: int = SECOND, things: Sequence[Thing] = THREE) -> Bundle:
+    """A scan of some things and the boxes around them, both as they should be."""
+    return bundle(scanned(things, stamp_ns), detected([t.name for t in things], boxes(things), stamp_ns))
+
+
+def check(scene: SceneObjects, things: Sequence[Thing]) -> None:
+    """The scene holds these things where they stand, in their order."""
+    assert scene.classes == tuple(thing.name for thing in things)
+    np.testing.assert_allclose(scene.positions_xy, [[thing.x, thing.y] for thing in things], atol=1e-9)

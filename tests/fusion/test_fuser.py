@@ -12,19 +12,22 @@ from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import Bundle, OdometryAt
 
-from tests.fusion.cylinders import THREE, Thing, believe, boxes, bundle, camera_view, detected, fused, moved, scanned
-
-SECOND = 10**9
-NAMES = [thing.name for thing in THREE]
-
-
-def plain(stamp_ns: int = SECOND, things: tuple[Thing, ...] = THREE) -> Bundle:
-    return bundle(scanned(things, stamp_ns), detected([t.name for t in things], boxes(things), stamp_ns))
-
-
-def check(scene: SceneObjects, things: tuple[Thing, ...]) -> None:
-    assert scene.classes == tuple(thing.name for thing in things)
-    np.testing.assert_allclose(scene.positions_xy, [[thing.x, thing.y] for thing in things], atol=1e-9)
+from tests.fusion.cylinders import (
+    NAMES,
+    SECOND,
+    THREE,
+    Thing,
+    believe,
+    boxes,
+    bundle,
+    camera_view,
+    check,
+    detected,
+    fused,
+    moved,
+    plain,
+    scanned,
+)
 
 
 def test_every_object_gets_its_class_and_its_centre() -> None:

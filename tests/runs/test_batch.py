@@ -44,8 +44,9 @@ def test_numeric_libraries_get_one_thread(monkeypatch: pytest.MonkeyPatch) -> No
 def test_ctrl_c_lets_the_running_ones_clean_up_and_starts_no_more(tmp_path: Path) -> None:
     gate, cleaned, never = tmp_path / "gate", tmp_path / "cleaned", tmp_path / "never"
     os.mkfifo(gate)
-    running = (
+    running = (  # which hears Ctrl-C also where the tests' own parent ignores it, as a shell's background jobs do
         "import signal\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         f"try:\n    open({str(gate)!r}, 'w').close()\n    signal.pause()\n"
         f"except KeyboardInterrupt:\n    open({str(cleaned)!r}, 'w').close()"
     )

@@ -12,35 +12,26 @@ from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.messages.codec import encode
 from mcap_landmarks.messages.markers import MarkerArray, MarkerShape
-from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.typestore import typestore
-from mcap_landmarks.stage import Bundle, Stamped
+from mcap_landmarks.stage import Stamped
 from mcap_landmarks.stages.fuse import process
 
 from tests.fusion.cylinders import (
     KNOWN,
+    NAMES,
+    SECOND,
     THREE,
     Thing,
     boxes,
     bundle,
+    check,
     detected,
     fused,
     information,
     moved,
+    plain,
     scanned,
 )
-
-SECOND = 10**9
-NAMES = [thing.name for thing in THREE]
-
-
-def plain(stamp_ns: int = SECOND, things: tuple[Thing, ...] = THREE) -> Bundle:
-    return bundle(scanned(things, stamp_ns), detected([t.name for t in things], boxes(things), stamp_ns))
-
-
-def check(scene: SceneObjects, things: tuple[Thing, ...]) -> None:
-    assert scene.classes == tuple(thing.name for thing in things)
-    np.testing.assert_allclose(scene.positions_xy, [[thing.x, thing.y] for thing in things], atol=1e-9)
 
 
 @pytest.mark.parametrize("late_s", [-0.1, 0.1])
