@@ -84,7 +84,7 @@ def _of_types(present: Collection[tuple[str, str]], types: Collection[str]) -> l
 
 
 def could_be(present: Iterable[tuple[str, str]], channel: Channel[Message]) -> str:
-    """Which topics, of (topic, message type), a user could choose as a channel that none is by itself; empty if none."""
+    """Topics, of (topic, message type), that a user could choose as a channel that none is by itself; empty if none."""
     role = ROLES.get(channel)
     if role is None:
         return ""
