@@ -18,7 +18,7 @@ from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.runs.pipeline import LogRun, run_stages
 from mcap_landmarks.runs.plan import Request
 from mcap_landmarks.runs.thinning import TOO_FAST, Thinning
-from mcap_landmarks.stage import Stage
+from mcap_landmarks.stage import Connection, Stage
 
 from tests.cli.calls import call, refused, topics
 from tests.maps.examples import small_map
@@ -154,3 +154,24 @@ def test_a_topic_has_one_writer_in_a_run(here: Path) -> None:
 def test_a_log_without_any_source_is_told_all_of_them(here: Path) -> None:
     with pytest.raises(RecordingError, match=r"no image \(.*\) or scan \(.*\) to make it from"):
         localized(here, "none")
+
+
+def test_objects_of_a_scan_that_is_not_there_are_fused_without_what_only_a_cloud_adds(here: Path) -> None:
+    """A log may bring scan objects of someone else; the clustered cloud beside them is optional."""
+    call(
+        "run",
+        here / "both.mcap",
+        "-o",
+        here / "made.mcap",
+        "--stages",
+        "detect,cluster",
+        "--model",
+        here / "model.onnx",
+    )
+    brought: dict[str, Connection] = {}
+    with open_recording(here / "made.mcap") as made, create_recording(here / "brought.mcap") as writer:
+        for raw in made.messages():
+            if raw.connection.topic not in {SCAN.topic, CAMERA_IMAGE.topic}:
+                plain = dataclasses.replace(raw.connection, metadata={})
+                writer.write(raw._replace(connection=brought.setdefault(raw.connection.topic, plain)))
+    assert names(localized(here, "brought", "out", "fuse")) == ["fuse", "localize"]

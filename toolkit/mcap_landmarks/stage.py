@@ -221,7 +221,8 @@ class Stage:
     """One step of the pipeline: what it reads and writes, its configuration and its code.
 
     The first channel of `reads` is the primary one: each of its messages makes a bundle, and a log must have it;
-    `thinned` lets --image-rate and --every leave out some of them. A channel of `writes` gets its own topic, or the one
+    `thinned` lets --image-rate and --every leave out some of them. Channels of `reads` that are `optional`, too, are
+    read where they are there, and no other stage is run to make them. A channel of `writes` gets its own topic, or the one
     that its function in `places` gives. `config` is a dataclass type. `resources` are files that the runner opens,
     hashes and passes in, `options` files that may be missing; where the user gives none, a resource is what its
     function in `bundled` gives, a file that travels with the program. `tolerance` says how far each field, by the name
@@ -233,6 +234,7 @@ class Stage:
     writes: tuple[Channel[Message], ...]
     config: type[Config]
     process: Process
+    optional: tuple[Channel[Message], ...] = ()
     thinned: bool = False
     places: Mapping[Channel[Message], Place] = field(default_factory=dict)
     resources: tuple[str, ...] = ()

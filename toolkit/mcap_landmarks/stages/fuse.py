@@ -120,6 +120,7 @@ STAGE = Stage(
     writes=(SCENE_OBJECTS, SCENE_MARKERS),
     config=FuseConfig,
     process=process,
+    optional=(CLUSTERED_CLOUD,),
     options=("extrinsics",),
     tolerance={
         "position_m": 1e-6,
