@@ -222,8 +222,8 @@ class Stage:
 
     The first channel of `reads` is the primary one: each of its messages makes a bundle, and a log must have it;
     `thinned` lets --image-rate and --every leave out some of them. Channels of `reads` that are `optional`, too, are
-    read where they are there, and no other stage is run to make them. A channel of `writes` gets its own topic, or the one
-    that its function in `places` gives. `config` is a dataclass type. `resources` are files that the runner opens,
+    read where they are there, and no other stage is run to make them. A channel of `writes` gets its own topic, or the
+    one that its function in `places` gives. `config` is a dataclass type. `resources` are files that the runner opens,
     hashes and passes in, `options` files that may be missing; where the user gives none, a resource is what its
     function in `bundled` gives, a file that travels with the program. `tolerance` says how far each field, by the name
     that `diff` gives it, may differ between two machines; a number is absolute.
