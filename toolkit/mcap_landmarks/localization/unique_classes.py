@@ -87,7 +87,7 @@ class UniqueClassLocalizer:
                 mask=pairs.mask,
             ).model
         distance_m = self._sensor.distance_m(pairs.range_m, pairs.bearing_rad)
-        # The log tells how range and bearing compare; in all, sigmas stay as large as they are pairs.
+        # The log tells how range and bearing compare; in all, sigmas stay as large as they are given.
         shape = self._sensor.scale / self._sensor.scale.max()
         noise = pairs.covariance * np.outer(shape, shape)
 
