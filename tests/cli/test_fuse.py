@@ -153,5 +153,5 @@ def test_sizes_and_classes_are_settings(tmp_path: Path) -> None:
         '[fuse]\nlandmark_classes = ["person", "suitcase"]\n'
         "[fuse.sizes.person]\ntop_m = [0.2, 0.3]\nwidth_m = [0.2, 0.3]\nradius_m = 0.1\n"
     )
-    assert fuse(log, out, "--config", str(settings), "--set", "fuse.min_objects=1") == 0
+    assert fuse(log, out, "--config", str(settings)) == 0
     assert scenes(out) == [("suitcase",)] * 5

@@ -8,6 +8,7 @@ from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.fusion.cloud_fuser import CloudFuser, _distinct
 from mcap_landmarks.fusion.cloud_objects import FoundObject
 from mcap_landmarks.fusion.config import FuseConfig
+from mcap_landmarks.fusion.object_motions import ObjectMotions
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.geometry.se2 import Array
@@ -17,6 +18,7 @@ from mcap_landmarks.lidar.whole_clouds import whole_cloud
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.stage import OdometryAt
 
 from tests.lidar.clouds import AHEAD, Solid, cloud
 
@@ -57,7 +59,9 @@ def fused(
     told: Sequence[Told], solids: Sequence[Solid], fuser: CloudFuser | None = None, **odometry: Array
 ) -> tuple[SceneObjects, int]:
     view = CameraView.at(CAMERA, BASE_FROM_CAMERA, np.zeros(3), 0.0)
-    return (fuser or CloudFuser(FuseConfig())).add(clustered(solids), detections(told), view, odometry.get("odometry"))
+    return (fuser or CloudFuser(FuseConfig(), ObjectMotions())).add(
+        clustered(solids), detections(told), view, odometry.get("odometry")
+    )
 
 
 def test_a_car_and_a_person_stand_where_they_are() -> None:
@@ -119,10 +123,12 @@ def test_an_unsure_box_on_nothing_of_its_size_is_left_out() -> None:
 
 
 def test_a_track_keeps_the_class_that_most_boxes_say() -> None:
-    fuser, still = CloudFuser(FuseConfig()), np.zeros(3)
+    motions, still = ObjectMotions(), np.zeros(3)
+    fuser = CloudFuser(FuseConfig(), motions)
     ids, classes = set(), []
     for name in ("car", "car", "truck", "car"):
         scene, _ = fused([(name, 0.7, CAR)], [CAR], fuser, odometry=still)
+        motions.add(scene, OdometryAt("odom", still, np.zeros((3, 3)), 0.0, 0.0))
         ids.update(scene.ids)
         classes.append(scene.classes)
         np.testing.assert_allclose(scene.positions_xy, [[CAR.x, CAR.y]], atol=0.4)
@@ -131,7 +137,7 @@ def test_a_track_keeps_the_class_that_most_boxes_say() -> None:
 
 
 def test_without_an_image_or_points_the_scene_is_empty() -> None:
-    fuser = CloudFuser(FuseConfig())
+    fuser = CloudFuser(FuseConfig(), ObjectMotions())
     scene, unexplained = fuser.add(clustered([CAR]), None, None, None)
     assert (len(scene), unexplained) == (0, 0)
     nothing = ClusteredCloud(
@@ -155,7 +161,9 @@ def test_what_only_the_camera_places_stands_on_the_sloping_ground_as_tall_as_its
     view = CameraView.at(CAMERA, BASE_FROM_CAMERA, np.zeros(3), 0.0)
     beside = [Solid(24.0, 5.0, 1.0, 1.0, 1.5), Solid(34.0, 3.0, 1.0, 1.0, 1.5), Solid(8.0, 1.9, 0.6, 0.6, 1.0)]
     ground = clustered(beside, slope=(slope, 0.0))
-    scene, unexplained = CloudFuser(FuseConfig()).add(ground, detections([("person", 0.8, far)]), view, None)
+    scene, unexplained = CloudFuser(FuseConfig(), ObjectMotions()).add(
+        ground, detections([("person", 0.8, far)]), view, None
+    )
     assert (scene.classes, unexplained) == (("person",), 0)
     assert scene.boxes is not None
     tall = scene.boxes.sizes_m[0, 2]

@@ -88,7 +88,7 @@ def test_a_wrong_class_in_one_image_does_not_stick(at: int) -> None:
 
 def test_a_class_that_does_not_fit_the_box_is_not_believed() -> None:
     wrong = detected(["person", "fire hydrant", "suitcase"], boxes(THREE), SECOND)
-    scenes, left_out = fused([bundle(scanned(THREE, SECOND), wrong)], FuseConfig(min_objects=1))
+    scenes, left_out = fused([bundle(scanned(THREE, SECOND), wrong)])
     assert scenes[0].classes == ("suitcase",)
     assert len(left_out) == 2
 
@@ -140,7 +140,7 @@ def test_a_merged_cluster_is_no_object() -> None:
     positions = (objects.positions_xy[0], objects.positions_xy[1][-1:], objects.positions_xy[2])
     covariances = (objects.covariances[0], objects.covariances[1][-1:], objects.covariances[2])
     merged = dataclasses.replace(objects, hypotheses=hypotheses, positions_xy=positions, covariances=covariances)
-    scenes, _ = fused([bundle(merged, given)] * 5, FuseConfig(min_objects=1))
+    scenes, _ = fused([bundle(merged, given)] * 5)
     assert [scene.classes for scene in scenes] == [("suitcase",)] * 5
 
 
@@ -176,7 +176,7 @@ def driven(seen: Sequence[Thing], named: Sequence[Thing], steps: int, ids: Seque
 def test_a_box_of_what_the_lidar_does_not_see_is_of_nothing_else() -> None:
     """Not of the only thing that is nearly in line with it."""
     hidden, beside = Thing("fire hydrant", 9.0, 1.5), Thing("cone", 7.0, 0.99)
-    scenes, left_out = fused(driven((beside, THREE[2]), (hidden, THREE[2]), 4), FuseConfig(min_objects=1))
+    scenes, left_out = fused(driven((beside, THREE[2]), (hidden, THREE[2]), 4))
     assert [scene.classes for scene in scenes] == [("suitcase",)] * 4
     assert left_out == ["detections where the scan has no object that fits"] * 4
 

@@ -69,9 +69,11 @@ def test_no_detections_are_none() -> None:
     assert (len(kept), kept.boxes_xyxy.shape, left_out) == (0, (0, 4), {})
 
 
-def test_a_scene_of_too_few_is_empty() -> None:
-    scene = SceneObjects(5, "base", ("a", "b"), ((), ()), np.zeros((2, 2)), np.zeros((2, 2, 2)), np.ones(2))
-    assert at_least(scene, 2) is scene
-    none = at_least(scene, 3)
+def test_a_scene_of_too_few_is_empty_and_what_it_had_is_counted() -> None:
+    classes = ((("car", 0.9),), (("person", 0.8),))
+    scene = SceneObjects(5, "base", ("a", "b"), classes, np.zeros((2, 2)), np.zeros((2, 2, 2)), np.ones(2))
+    assert at_least(scene, 2) == (scene, {})
+    none, left_out = at_least(scene, 3)
     assert (none.stamp_ns, none.frame_id, none.ids, none.hypotheses) == (5, "base", (), ())
     assert (none.positions_xy.shape, none.covariances.shape, none.radii_m.shape) == ((0, 2), (0, 2, 2), (0,))
+    assert left_out == {"objects of scenes with fewer than 3: car": 1, "objects of scenes with fewer than 3: person": 1}

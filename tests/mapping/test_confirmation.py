@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from mcap_landmarks.mapping.config import BuildMapConfig
-from mcap_landmarks.mapping.confirmation import confirmed
+from mcap_landmarks.mapping.confirmation import confirmed, stood
 
 CONFIG = BuildMapConfig()
 SPREAD = np.tile(0.01 * np.eye(2), (2, 1, 1))
@@ -39,3 +39,13 @@ def test_one_of_several_others_at_its_place_is_enough() -> None:
     # Of two that were seen as seldom neither is the other's misreading.
     assert confirmed(xy[2:], spread[2:], seen[2:], CONFIG).tolist() == [True, True]
     assert confirmed(xy[:0], spread[:0], seen[:0], CONFIG).tolist() == []
+
+
+def test_what_may_have_passed_by_was_not_seen_standing() -> None:
+    """A person who walks is 2 m farther on after 1.3 s, a car after 0.2 s; a hydrant stays where it is."""
+    classes, times = ("person", "person", "car", "fire hydrant"), np.array([0, 1, 0, 2, 0, 1, 0], dtype=np.int64)
+    numbers = np.array([0, 0, 1, 1, 2, 2, 3])
+    assert stood(classes, [(numbers, times * 10**9)]).tolist() == [False, True, True, True]
+    nobody, moment = np.zeros(0, dtype=np.int64), np.array([0], dtype=np.int64)
+    assert stood(("car",), [(moment, moment)]).tolist() == [False]
+    assert stood(("car",), [(moment, moment), (nobody, nobody), (moment, moment)]).tolist() == [True]

@@ -17,6 +17,7 @@ from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.messages.velocities import SceneVelocities
 
 number = st.floats(-1e6, 1e6)
 anything = st.floats(width=64)
@@ -61,6 +62,14 @@ def scene_objects(draw: st.DrawFn) -> SceneObjects:
     around = draw(boxes(n))
     radii = around.sizes_m[:, 0] / 2 if around else draw(vector(n, elements=st.floats(0, 100)))
     return SceneObjects(draw(stamp), draw(text), ids, classes, draw(vector(n, 2)), draw(vector(n, 2, 2)), radii, around)
+
+
+@st.composite
+def scene_velocities(draw: st.DrawFn) -> SceneVelocities:
+    ids = draw(st.lists(text, max_size=4).map(tuple))
+    n = len(ids)
+    moving = draw(arrays(np.bool_, (n,)))
+    return SceneVelocities(draw(stamp), draw(text), ids, draw(vector(n, 2)), draw(vector(n, 2, 2)), moving)
 
 
 @st.composite
@@ -119,6 +128,7 @@ MESSAGES = st.one_of(
     st.builds(LaserScan, stamp, text, *[single] * 7, scan_ranges, scan_ranges),
     st.builds(PointCloud2, stamp, text, cloud_points),
     clustered_cloud(),
+    scene_velocities(),
     st.builds(CompressedImage, stamp, text, text, st.binary(max_size=30)),
     st.builds(
         Image, stamp, text, st.integers(0, 9), st.integers(0, 9), text, st.booleans(), st.integers(0, 9), st.binary()

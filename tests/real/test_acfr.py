@@ -139,7 +139,7 @@ def output(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_log(folder / "log.mcap", content)
     log, out, low, high = folder / "log.mcap", folder / "out.mcap", *SLICE_M
     options = ["--model", str(model), "--scan", CLOUD.topic, "--set", f"cluster.slice_m=[{low}, {high}]"]
-    options += ["--set", "fuse.min_objects=1", "--stages", "detect,cluster,fuse"]
+    options += ["--stages", "detect,cluster,fuse"]
     with pytest.raises(SystemExit) as done:
         run(["run", str(log), "-o", str(out), *options])
     assert done.value.code == 0

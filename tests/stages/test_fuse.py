@@ -52,10 +52,11 @@ def test_classes_are_chosen_and_ignored() -> None:
     assert scenes[0].classes == ("fire hydrant", "suitcase")
 
 
-def test_one_object_is_no_scene() -> None:
-    scenes, _ = fused([plain(SECOND, THREE[:1]), plain(SECOND, ())])
-    assert [len(scene) for scene in scenes] == [0, 0]
-    assert len(fused([plain(SECOND, THREE[:1])], FuseConfig(min_objects=1))[0][0]) == 1
+def test_one_object_is_a_scene_unless_more_are_asked_for() -> None:
+    scenes, left_out = fused([plain(SECOND, THREE[:1]), plain(SECOND, ())])
+    assert ([len(scene) for scene in scenes], left_out) == ([1, 0], [])
+    scenes, left_out = fused([plain(SECOND, THREE[:1])], FuseConfig(min_objects=2))
+    assert (len(scenes[0]), left_out) == (0, ["objects of scenes with fewer than 2: fire hydrant"])
 
 
 def test_what_is_nowhere_is_left_out() -> None:

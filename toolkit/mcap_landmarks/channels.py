@@ -13,6 +13,7 @@ from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.messages.velocities import SceneVelocities
 from mcap_landmarks.stage import Channel, InputLog
 
 CAMERA_IMAGE = Channel("/camera/image_raw/compressed", CompressedImage)
@@ -29,6 +30,7 @@ SCAN_OBJECTS = Channel("/landmarks/scan_objects", ScanObjects)
 CLUSTERED_CLOUD = Channel("/landmarks/clustered_cloud", ClusteredCloud)
 SCAN_FILTERED = Channel("/landmarks/scan_filtered", LaserScan)
 SCENE_OBJECTS = Channel("/landmarks/scene_objects", SceneObjects)
+SCENE_VELOCITIES = Channel("/landmarks/scene_velocities", SceneVelocities)
 SCENE_MARKERS = Channel("/landmarks/scene_markers", MarkerArray)
 
 MAP_MARKERS = Channel("/landmarks/map_markers", MarkerArray)

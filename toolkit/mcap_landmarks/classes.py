@@ -1,4 +1,4 @@
-"""What the toolkit knows of each class: how large it is, what a LiDAR meets of it, whether it moves; one table."""
+"""What the toolkit knows of each class: how large it is, what a LiDAR meets of it, how fast it moves; one table."""
 
 import math
 from dataclasses import dataclass
@@ -96,15 +96,16 @@ class Cuboid:
 
 @dataclass(frozen=True, slots=True)
 class ObjectClass:
-    """One class: its size, the cross-sections that it may have at the LiDAR's height, and whether it moves by itself.
+    """One class: its size, the cross-sections that it may have at the LiDAR's height, and how fast it may be.
 
     A class without `sections` has no shape that a scan could be held against. One with a `cuboid` is a box in a cloud,
-    which shows all of an object that is above the ground; others are round there.
+    which shows all of an object that is above the ground; others are round there. `speed_mps` is the usual speed of
+    what moves by itself, 0 for what does not.
     """
 
     size: Size
     sections: tuple[Section, ...] = ()
-    moves: bool = False
+    speed_mps: float = 0.0
     cuboid: Cuboid | None = None
 
 
@@ -115,18 +116,20 @@ _CHAIR = tuple((x * 0.19, y * 0.19, 0.022) for x in (1, -1) for y in (1, -1))
 
 CLASSES: dict[str, ObjectClass] = {
     "person": ObjectClass(
-        Size(top_m=(1.5, 1.95), width_m=(0.3, 0.9), radius_m=0.25), (Legs(0.06, (0.16, 0.32)), Disc(0.25)), moves=True
+        Size(top_m=(1.5, 1.95), width_m=(0.3, 0.9), radius_m=0.25),
+        (Legs(0.06, (0.16, 0.32)), Disc(0.25)),
+        speed_mps=1.5,
     ),
     "bicycle": ObjectClass(
         Size(top_m=(0.9, 1.15), width_m=(0.4, 1.9), radius_m=0.81),
         (Parts(boxes=_BICYCLE, symmetry=2),),
-        moves=True,
+        speed_mps=4.0,
         cuboid=Cuboid((1.72, 0.15), (0.60, 0.12), (1.10, 0.15)),
     ),
     "car": ObjectClass(
         Size(top_m=(1.35, 1.8), width_m=(1.5, 5.0), radius_m=2.27),
         (Box(4.2, 1.74, 0.3),),
-        moves=True,
+        speed_mps=10.0,
         cuboid=Cuboid((4.2, 0.5), (1.74, 0.13), (1.56, 0.15)),
     ),
     "traffic light": ObjectClass(
@@ -147,27 +150,27 @@ CLASSES: dict[str, ObjectClass] = {
     "potted plant": ObjectClass(Size(top_m=(0.3, 1.4), width_m=(0.25, 1.3), radius_m=0.18), (Disc(0.18),)),
     "van": ObjectClass(
         Size(top_m=(1.8, 2.8), width_m=(1.7, 6.0), radius_m=2.7),
-        moves=True,
+        speed_mps=10.0,
         cuboid=Cuboid((5.1, 0.5), (1.93, 0.13), (2.2, 0.3)),
     ),
     "truck": ObjectClass(
         Size(top_m=(1.9, 4.2), width_m=(1.8, 13.0), radius_m=4.3),
-        moves=True,
+        speed_mps=10.0,
         cuboid=Cuboid((8.0, 2.5), (2.5, 0.25), (3.0, 0.5)),
     ),
     "bus": ObjectClass(
         Size(top_m=(2.6, 4.4), width_m=(2.2, 18.5), radius_m=5.8),
-        moves=True,
+        speed_mps=10.0,
         cuboid=Cuboid((11.2, 2.0), (2.75, 0.25), (3.4, 0.4)),
     ),
     "motorcycle": ObjectClass(
         Size(top_m=(1.0, 1.9), width_m=(0.5, 2.4), radius_m=1.05),
-        moves=True,
+        speed_mps=10.0,
         cuboid=Cuboid((2.1, 0.2), (0.77, 0.15), (1.45, 0.2)),
     ),
     "cyclist": ObjectClass(
         Size(top_m=(1.4, 1.95), width_m=(0.4, 1.95), radius_m=0.88),
-        moves=True,
+        speed_mps=4.0,
         cuboid=Cuboid((1.76, 0.18), (0.60, 0.15), (1.74, 0.12)),
     ),
 }
@@ -178,5 +181,26 @@ between the means of the labels of KITTI (Geiger et al. 2012: car 3.88 x 1.63 x 
 2.5 x 2.8, bus 11.2 x 2.9 x 3.5, motorcycle 2.1 x 0.77 x 1.47, bicycle 1.7 x 0.6 x 1.3 m), their deviations cover both.
 A cyclist is a person with the bicycle that it rides."""
 
+_OTHER_SPEEDS_MPS = {
+    **dict.fromkeys(("train", "boat", "airplane"), 10.0),
+    **dict.fromkeys(("bird", "cat", "dog", "horse", "sheep", "cow", "elephant", "bear", "zebra", "giraffe"), 1.5),
+}
+"""Those of COCO that move by themselves, of unknown size; people and animals walk, vehicles drive in towns."""
+_CARRIED = frozenset(
+    {"backpack", "umbrella", "handbag", "suitcase", "skateboard", "surfboard", "skis", "snowboard", "frisbee"}
+    | {"sports ball", "bottle", "cup", "bowl", "laptop", "book", "teddy bear", "chair", "potted plant"}
+)
+"""Those of COCO that people put elsewhere."""
+
 ANY_SIZE = Size(top_m=(0.1, 6.0), width_m=(0.05, 6.0), radius_m=0.0)
 """What stands on the ground and is nothing of the above."""
+
+
+def speed_mps(name: str) -> float:
+    """The usual speed of what is of a class and moves by itself; 0 if it does not, or if the class is unknown."""
+    return CLASSES[name].speed_mps if name in CLASSES else _OTHER_SPEEDS_MPS.get(name, 0.0)
+
+
+def is_movable(name: str) -> bool:
+    """Whether what is of a class may stand elsewhere another day: it moves by itself, or people carry it."""
+    return speed_mps(name) > 0 or name in _CARRIED

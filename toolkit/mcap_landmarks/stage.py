@@ -258,7 +258,7 @@ class Reduction:
     """The step that makes one result of many logs: `collect` per log, then `solve` over what was collected.
 
     `collect(bundles, config)` gives one log's observations, `solve(observations, prior, config)` the map, one
-    trajectory per log, and how the solver ended. A log must have every channel of `reads`.
+    trajectory per log, and how the solver ended. A log must have every channel of `reads` that is not `optional`.
     """
 
     name: str
@@ -267,12 +267,13 @@ class Reduction:
     config: type[Config]
     collect: Callable[[Iterable[Bundle], Any], Any]
     solve: Callable[..., Any]
+    optional: tuple[Channel[Message], ...] = ()
     tolerance: Mapping[str, float | Tolerance] = field(default_factory=dict)
 
     @property
     def required(self) -> tuple[Channel[Message], ...]:
         """The channels of `reads` that a log must have."""
-        return self.reads
+        return tuple(channel for channel in self.reads if channel not in self.optional)
 
     @property
     def files(self) -> tuple[str, ...]:

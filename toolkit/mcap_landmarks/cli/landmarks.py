@@ -82,6 +82,13 @@ def show(database: Database, json: options.Json = False) -> None:
         _print(database, landmark_map)
 
 
+def _mark(landmark_map: "LandmarkMap", i: int) -> str:
+    """What is to be known of a landmark beside its class."""
+    marks = {"tentative": landmark_map.tentative[i], "movable": landmark_map.movable[i]}
+    told = ", ".join(word for word, holds in marks.items() if holds)
+    return f" ({told})" if told else ""
+
+
 def _print(database: Location, landmark_map: "LandmarkMap") -> None:
     import numpy as np
 
@@ -93,7 +100,7 @@ def _print(database: Location, landmark_map: "LandmarkMap") -> None:
     rows = [
         [
             identity,
-            landmark_map.classes[i] + (" (tentative)" if landmark_map.tentative[i] else ""),
+            landmark_map.classes[i] + _mark(landmark_map, i),
             *(f"{value:.4f}" for value in landmark_map.positions_xy[i]),
             f"{sigma_m[i]:.4f}" if sigma_m[i] > 0 else "-",
             f"{landmark_map.radii_m[i]:.3f}" if landmark_map.radii_m[i] > 0 else "-",

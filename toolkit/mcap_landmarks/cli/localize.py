@@ -31,12 +31,15 @@ def command(
     ] = None,
     use: options.Use = None,
     extrinsics: options.Extrinsics = None,
+    fixed: options.Fixed = False,
 ) -> None:
     """Localize every bundle of LOG... in a landmark map; write the input with pose and match.
 
     Where a log has no scene objects, they are made first, from images and scans.
     """
-    asked = Given(given, images, scans, {"map": map_file, "extrinsics": extrinsics}, use)
+    asked = Given(
+        given, images, scans, {"map": map_file, "extrinsics": extrinsics}, use, ["localize.fixed=true"] * fixed
+    )
     asked_ns = options.time_ns(at, "--at")
     if asked_ns is not None:
         if output is not None or len(logs) > 1:

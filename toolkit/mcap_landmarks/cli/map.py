@@ -35,6 +35,7 @@ def command(
     ] = None,
     use: options.Use = None,
     extrinsics: options.Extrinsics = None,
+    fixed: options.Fixed = False,
 ) -> None:
     """Build one landmark map from LOG...; with -o also write each log with its results.
 
@@ -44,7 +45,7 @@ def command(
     if from_reference:
         _from_reference(logs, database, given.json)
         return
-    asked = Given(given, images, scans, {"extrinsics": extrinsics}, use)
+    asked = Given(given, images, scans, {"extrinsics": extrinsics}, use, ["build_map.fixed=true"] * fixed)
     run = _build(logs, database, prior, output, asked)
     for log in run.logs:
         tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)

@@ -70,6 +70,10 @@ Use = Annotated[
     list[str] | None,
     typer.Option("--use", metavar="STAGE", help="Stage to use where several can make what the log lacks; repeatable."),
 ]
+Fixed = Annotated[
+    bool,
+    typer.Option("--fixed", help="Leave out what may stand elsewhere another day, by its class: people, cars, bags."),
+]
 Force = Annotated[bool, typer.Option("--force", help="Run every stage anew, also where its results are there.")]
 ConfigFile = Annotated[
     Location | None, typer.Option("--config", parser=location, help="TOML file with one table per stage.")

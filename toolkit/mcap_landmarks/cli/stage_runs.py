@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 class Given:
     """What the options of a verb say about all its logs; `files` are those beside the model, by resource name.
 
-    `use` names the stages to use where several could make what a log lacks.
+    `use` names the stages to use where several could make what a log lacks, `settings` are those that the verb's own
+    options stand for.
     """
 
     options: LogOptions
@@ -30,6 +31,7 @@ class Given:
     scans: ScanOptions = field(default_factory=ScanOptions)
     files: Mapping[str, Location | None] = field(default_factory=dict)
     use: Sequence[str] | None = None
+    settings: Sequence[str] = ()
 
     def requests(self, logs: Sequence[Location]) -> "list[Request]":
         """What to do with each log.
@@ -41,7 +43,8 @@ class Given:
         from mcap_landmarks.runs.plan import Request
 
         given, files = self.options, {"model": self.images.model, **self.files}
-        settings = gather(given.config_file, [*(given.settings or []), *self.scans.settings()], given.method)
+        own = [*self.scans.settings(), *self.settings]
+        settings = gather(given.config_file, [*(given.settings or []), *own], given.method)
         span, thinning, use = self._span(), self.images.thinning(), tuple(self.use or ())
         return [Request(log, settings, files, span, thinning, use, given.results_only, given.force) for log in logs]
 

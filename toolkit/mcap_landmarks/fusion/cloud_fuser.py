@@ -9,9 +9,9 @@ from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.fusion.cloud_objects import FoundObject, Look, find, place_by_camera, place_of
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.frustum import CloudView
+from mcap_landmarks.fusion.object_motions import ObjectMotions
 from mcap_landmarks.fusion.seen_things import Seen, seen_things
 from mcap_landmarks.geometry.se2 import Array
-from mcap_landmarks.lidar.object_tracks import Tracks
 from mcap_landmarks.lidar.rectangles import Rectangle
 from mcap_landmarks.messages.boxes import Boxes
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
@@ -19,18 +19,14 @@ from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.hypotheses import Hypotheses
 from mcap_landmarks.messages.scene import SceneObjects
 
-_GATE_M, _MEMORY_S = 1.5, 3.0
-"""How far an object may be from where it was last and keep its id, and for how long without being seen: cars pass at 15
-m/s, ten times a second."""
 _LEAST_TOLD = 0.005
 
 
 class CloudFuser:
-    """Fuses cloud after cloud. Its state is what each track has been taken for so far."""
+    """Fuses cloud after cloud. Its state is what each track has been taken for; `motions` tell where they are."""
 
-    def __init__(self, config: FuseConfig) -> None:
-        self._config = config
-        self._tracks = Tracks(_GATE_M, _MEMORY_S)
+    def __init__(self, config: FuseConfig, motions: ObjectMotions) -> None:
+        self._config, self._motions = config, motions
         self._classes: dict[str, dict[str, float]] = {}
 
     def add(
@@ -48,7 +44,9 @@ class CloudFuser:
         found = [one for one in find(look, things) if one.score >= self._config.min_probability]
         found = _distinct(found)
         centres = np.array([one.place.centre_xy for one in found]).reshape(-1, 2)
-        names = self._tracks.names(cloud.stamp_ns, odometry, centres)
+        spreads = np.array([one.place.covariance for one in found]).reshape(-1, 2, 2)
+        seen_as = [things[one.box].name for one in found]
+        names = self._motions.names(cloud.stamp_ns, odometry, (centres, spreads), seen_as)
         classes = [self._learn(name, things[one.box], one.score) for name, one in zip(names, found, strict=True)]
         placed = [_as(look, one, things[one.box], options[0][0]) for one, options in zip(found, classes, strict=True)]
         explained = sum(things[one.box].boxes for one in found)

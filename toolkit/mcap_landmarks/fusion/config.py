@@ -17,9 +17,8 @@ class FuseConfig:
     """How detections and scan objects become scene objects.
 
     Only detections of `landmark_classes` count (all, if empty), and those of `ignore_classes` never. An object is in
-    the scene if its most probable class has `min_probability`, and the scene of a planar scan has at least
-    `min_objects`, else none. Where a cloud has no points on it the camera alone places an object, if the range is sure
-    to `camera_sigma_m`.
+    the scene if its most probable class has `min_probability`; a scene of fewer than `min_objects` is left empty. Where
+    a cloud has no points on it the camera alone places an object, if the range is sure to `camera_sigma_m`.
     `sizes` add to the built-in ones, by class: what heights and widths of a box are plausible, and the radius at the
     LiDAR's height; a class without gets its radius from the width of its boxes. A box and an object belong together if
     the chi-squares of their bearing and of its height and width are below `bearing_gate` and `size_gate`. Boxes are
@@ -36,7 +35,7 @@ class FuseConfig:
     landmark_classes: tuple[str, ...] = ()
     ignore_classes: tuple[str, ...] = ()
     min_probability: Share = 0.5
-    min_objects: Annotated[int, Field(ge=1)] = 2
+    min_objects: Annotated[int, Field(ge=1)] = 1
     sizes: dict[str, Size] = field(default_factory=dict)
     bearing_gate: Positive = 7.0
     size_gate: Positive = 4.0

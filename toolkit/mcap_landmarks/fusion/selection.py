@@ -10,6 +10,7 @@ from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
 
 UNWANTED = "detections of {}, which is no landmark by the settings"
+TOO_FEW = "objects of scenes with fewer than {}: {}"
 NO_BOX = "detections without a class or a box"
 
 
@@ -53,8 +54,9 @@ def wanted(detections: Detections, config: FuseConfig) -> tuple[Detections, Coun
     return kept, left_out
 
 
-def at_least(scene: SceneObjects, count: int) -> SceneObjects:
-    """A scene, if it has so many objects, else an empty one."""
+def at_least(scene: SceneObjects, count: int) -> tuple[SceneObjects, Counter[str]]:
+    """A scene, if it has so many objects, else an empty one; and how many were left out, by reason."""
     if len(scene) >= count:
-        return scene
-    return SceneObjects(scene.stamp_ns, scene.frame_id, (), (), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0))
+        return scene, Counter()
+    empty = SceneObjects(scene.stamp_ns, scene.frame_id, (), (), np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0))
+    return empty, Counter(TOO_FEW.format(count, name) for name in scene.classes)

@@ -29,8 +29,9 @@ class LocalizeConfig:
     bundles are matched together (0: each alone), through odometry whose noise per square root of a metre or radian is
     `odometry_position_m`, `odometry_heading_rad` and `odometry_turning_rad`.
 
-    `tf`: write map -> odom, or never. `thesis_guess_m`: the fixed initial guess of the thesis's solver, which the
-    thesis does not print.
+    What moves counts for nothing, and with `fixed` neither do landmarks and objects that may stand elsewhere another
+    day, by their class. `tf`: write map -> odom, or never. `thesis_guess_m`: the fixed initial guess of the thesis's
+    solver, which the thesis does not print.
     """
 
     method: Literal["default", "thesis"] = "default"
@@ -49,5 +50,6 @@ class LocalizeConfig:
     odometry_position_m: float = 0.05
     odometry_heading_rad: float = 0.05
     odometry_turning_rad: float = 0.1
+    fixed: bool = False
     tf: Literal["auto", "never"] = "auto"
     thesis_guess_m: tuple[float, float] = (0.0, 0.0)

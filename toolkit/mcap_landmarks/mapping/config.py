@@ -17,7 +17,8 @@ class BuildMapConfig:
     square root of a metre (`odometry_position_m`, `odometry_heading_rad`) or of a radian (`odometry_turning_rad`) is a
     first guess; the log itself tells the rest. `slack` widens the observations' sigmas while they are labelled.
     `robust_dof`: degrees of the Student-t distribution of the joint solution, which is refused if it has not converged
-    after `max_iterations`. A landmark with fewer fitting observations than `min_sightings` is tentative, and so
+    after `max_iterations`. What moves is no landmark, and with `fixed` neither is what may stand elsewhere another day,
+    by its class. A landmark with fewer fitting observations than `min_sightings` is tentative, and so
     is one that stands where another does and was seen less than `misread_share` times as often: it is that one under a
     wrong class. Logs are merged if their landmarks agree within `join_tolerance_m`; pairs of landmarks up to
     `join_reach_m` apart say how the logs lie to each other.
@@ -36,6 +37,7 @@ class BuildMapConfig:
     misread_share: float = 0.1
     join_tolerance_m: float = 0.6
     join_reach_m: float = 20.0
+    fixed: bool = False
 
     @property
     def odometry(self) -> OdometryNoise:

@@ -10,7 +10,7 @@ from mcap_landmarks.estimation.polar import polar_from_points
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.mapping.built_map import BuiltMap, LogTrajectory
 from mcap_landmarks.mapping.config import BuildMapConfig
-from mcap_landmarks.mapping.confirmation import confirmed
+from mcap_landmarks.mapping.confirmation import confirmed, stood
 from mcap_landmarks.mapping.data_association import UNLABELLED
 from mcap_landmarks.mapping.graph_slam import KnownLandmarks, MapSolution, solve_map
 from mcap_landmarks.mapping.groups import groups_of
@@ -98,10 +98,11 @@ def _map_of(
 ) -> LandmarkMap:
     """The solved landmarks with how often, how large and in which groups they were seen."""
     radii, measured = np.zeros(len(merged.class_ids)), np.zeros(len(merged.class_ids), dtype=np.int64)
-    sources = list(prior.sources) if prior else []
+    sources, fitting = list(prior.sources) if prior else [], list[tuple[Ints, Ints]]()
     for log, number, weight in zip(logs, numbers, solution.weights, strict=True):
         seen = np.flatnonzero(number != UNLABELLED)
         fits = seen[weight > _WRONG]
+        fitting.append((number[fits], log.stamps_ns[log.bundle[fits]]))
         sized = fits[log.radii_m[fits] > 0]
         np.add.at(radii, number[sized], log.radii_m[sized])
         np.add.at(measured, number[sized], 1)
@@ -116,6 +117,7 @@ def _map_of(
         radius[: len(prior)] = np.where(measured[: len(prior)] > 0, radius[: len(prior)], prior.radii_m)
     covariances = _definite(solution.covariance)
     sure = confirmed(solution.landmarks_xy, covariances, observations, config)
+    sure &= stood([names[class_id] for class_id in merged.class_ids], fitting)[row]
     if prior is not None:
         sure[: len(prior)] |= ~prior.tentative
     name_of = {int(number): ids[i] for i, number in enumerate(row) if sure[i]}

@@ -1,6 +1,7 @@
 """What one log saw, gathered for building a map: bundles with odometry, and the objects seen in them."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ class LogObservations:
     stamps_ns, log_times_ns (T,) rise; odom_from_base (T, 3), with the way_m (T,) and turned_rad (T,) up to there.
     Objects: `bundle` (N,) rises and says in which one each was seen, `classes` its most probable class, points_xy
     (N, 2) in the base frame with covariances (N, 2, 2) m^2, radii_m (N,), zero where unknown. `bundles` counts those
-    without odometry too.
+    without odometry too; `dropped` counts objects that cannot be landmarks, by reason.
     """
 
     stamps_ns: NDArray[np.int64]
@@ -30,6 +31,7 @@ class LogObservations:
     radii_m: Array
     bundles: int
     fingerprint: str = ""
+    dropped: Mapping[str, int] = field(default_factory=dict)
 
     def objects_of(self, bundle: int) -> NDArray[np.int64]:
         """Rows of the objects of one bundle."""

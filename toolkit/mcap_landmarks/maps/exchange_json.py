@@ -25,6 +25,7 @@ class _Landmark:
     radius_m: float
     sightings: int
     tentative: bool
+    movable: bool = False  # told to readers; the class decides
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +98,7 @@ def _group(row: _Group) -> Group:
 
 def document(landmark_map: LandmarkMap) -> dict[str, object]:
     """The map as a JSON document, numbers to the last bit."""
+    movable = landmark_map.movable
     landmarks = [
         {
             "id": identity,
@@ -107,6 +109,7 @@ def document(landmark_map: LandmarkMap) -> dict[str, object]:
             "radius_m": float(landmark_map.radii_m[i]),
             "sightings": int(landmark_map.sightings[i]),
             "tentative": bool(landmark_map.tentative[i]),
+            "movable": bool(movable[i]),
         }
         for i, identity in enumerate(landmark_map.ids)
     ]

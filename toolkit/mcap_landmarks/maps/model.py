@@ -1,11 +1,12 @@
 """The landmark map in memory: landmarks, groups seen together, and what the map was made from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mcap_landmarks.classes import is_movable
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.se2 import Array
 
@@ -95,6 +96,28 @@ class LandmarkMap:
 
     def __len__(self) -> int:
         return len(self.ids)
+
+    @property
+    def movable(self) -> NDArray[np.bool_]:
+        """Which landmarks (N,) may stand elsewhere another day, by their classes."""
+        return np.array([is_movable(name) for name in self.classes], dtype=np.bool_)
+
+    def without_movable(self) -> "LandmarkMap":
+        """The map of those landmarks that stay where they are; groups keep what is left of them."""
+        keep = np.flatnonzero(~self.movable)
+        ids = tuple(self.ids[i] for i in keep)
+        left = [(group, tuple(name for name in group.landmark_ids if name in {*ids})) for group in self.groups]
+        return replace(
+            self,
+            ids=ids,
+            classes=tuple(self.classes[i] for i in keep),
+            positions_xy=self.positions_xy[keep],
+            covariances=self.covariances[keep],
+            radii_m=self.radii_m[keep],
+            sightings=self.sightings[keep],
+            tentative=self.tentative[keep],
+            groups=tuple(replace(group, landmark_ids=names) for group, names in left if names),
+        )
 
     def _check_values(self) -> None:
         known = self.covariances.any(axis=(1, 2))

@@ -1,11 +1,12 @@
-"""Scene objects made fit to use: unusable ones dropped and counted, unknown covariances filled in."""
+"""Scene objects made fit to use: unusable ones and what moves dropped and counted, unknown covariances filled in."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcap_landmarks.classes import is_movable
 from mcap_landmarks.estimation.polar import points_from_polar
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.scene import SceneObjects
@@ -50,6 +51,22 @@ def usable(scene: SceneObjects, dropped: Counter[str]) -> SceneObjects:
     dropped["objects that repeat another one of the same class and place"] += len(again)
     keep[again] = False
     return scene if keep.all() else pick(scene, np.flatnonzero(keep))
+
+
+def standing(scene: SceneObjects, moving_ids: Collection[str], dropped: Counter[str], *, fixed: bool) -> SceneObjects:
+    """The objects that can be landmarks: what stands, and if only what is `fixed` counts, nothing of a movable class.
+
+    What else the scene holds is left out and counted by reason and class in `dropped`.
+    """
+    keep = []
+    for i, (name, class_name) in enumerate(zip(scene.ids, scene.classes, strict=True)):
+        if name in moving_ids:
+            dropped[f"objects that move: {class_name}"] += 1
+        elif fixed and is_movable(class_name):
+            dropped[f"objects that may stand elsewhere another day: {class_name}"] += 1
+        else:
+            keep.append(i)
+    return scene if len(keep) == len(scene) else pick(scene, keep)
 
 
 def _repeated(scene: SceneObjects, rows: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -85,6 +85,7 @@ def _collect(plan: MapPlan, log: LogPlan, session: Session, watch: Watch) -> tup
     with watch(f"read {source.path.name}", source.count, "bundles") as progress:
         observations: LogObservations = STAGE.collect(source.bundles(progress), plan.config)
     source.close()
+    source.reading.dropped.update(observations.dropped)
     if not len(observations.stamps_ns):
         raise RecordingError(
             f"{source.path}: none of {observations.bundles} bundles has odometry within 2 s; check that the clocks of "

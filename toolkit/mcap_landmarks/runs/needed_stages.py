@@ -23,9 +23,8 @@ def missing_stages(stage: Stage | Reduction, log: RecordedLog, use: Collection[s
         UsageError: several stages could make it, or `use` names what is no stage.
     """
     names: list[str] = []
-    optional = stage.optional if isinstance(stage, Stage) else ()
     for channel in stage.reads:
-        if channel.topic.startswith(RESULTS) and channel not in optional and not log.has(channel):
+        if channel.topic.startswith(RESULTS) and channel not in stage.optional and not log.has(channel):
             names += [name for name in _chain_for(channel, log, use) if name not in names]
     return names
 

@@ -1,10 +1,11 @@
 """Build a landmark map from scene objects and odometry of one or several logs."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from mcap_landmarks.channels import MAP_MARKERS, MAP_PATH, MAP_POSE, ODOMETRY, SCENE_OBJECTS
+from mcap_landmarks.channels import MAP_MARKERS, MAP_PATH, MAP_POSE, ODOMETRY, SCENE_OBJECTS, SCENE_VELOCITIES
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.mapping.built_map import BuiltMap
 from mcap_landmarks.mapping.config import BuildMapConfig
@@ -12,14 +13,17 @@ from mcap_landmarks.mapping.landmark_slam import solve_jointly
 from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.mapping.thesis import solve_as_in_the_thesis
 from mcap_landmarks.maps.model import LandmarkMap
-from mcap_landmarks.maps.scene_objects import known_covariances
+from mcap_landmarks.maps.scene_objects import known_covariances, standing
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import Bundle, OdometryAt, Reduction, Tolerance
 
 
 def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservations:
-    """What one log saw: its bundles that have odometry, and their objects."""
-    kept, scenes, odometry, count = _usable(bundles)
+    """What one log saw: its bundles that have odometry, and their objects; nothing that moves at any time."""
+    kept, seen, odometry, count = _usable(bundles)
+    velocities = [found for bundle in kept if (found := bundle.get(SCENE_VELOCITIES)) is not None]
+    moving, dropped = frozenset[str]().union(*(found.moving_ids for found in velocities)), Counter[str]()
+    scenes = [standing(scene, moving, dropped, fixed=config.fixed) for scene in seen]
     sizes = [len(scene) for scene in scenes]
     spread = [known_covariances(scene, config.range_sigma_m, config.bearing_sigma_rad) for scene in scenes]
     return LogObservations(
@@ -34,6 +38,7 @@ def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservation
         np.concatenate([np.zeros((0, 2, 2)), *spread]),
         np.concatenate([np.zeros(0), *(scene.radii_m for scene in scenes)]),
         count,
+        dropped=dropped,
     )
 
 
@@ -66,9 +71,10 @@ def solve(logs: Sequence[LogObservations], prior: LandmarkMap | None, config: Bu
 
 STAGE = Reduction(
     "build_map",
-    reads=(SCENE_OBJECTS, ODOMETRY),
+    reads=(SCENE_OBJECTS, ODOMETRY, SCENE_VELOCITIES),
     writes=(MAP_MARKERS, MAP_PATH, MAP_POSE),
     config=BuildMapConfig,
+    optional=(SCENE_VELOCITIES,),
     collect=collect,
     solve=solve,
     tolerance={

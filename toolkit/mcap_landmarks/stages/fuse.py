@@ -14,6 +14,7 @@ from mcap_landmarks.channels import (
     SCAN_OBJECTS,
     SCENE_MARKERS,
     SCENE_OBJECTS,
+    SCENE_VELOCITIES,
     TF_STATIC,
 )
 from mcap_landmarks.errors import RecordingError
@@ -21,6 +22,7 @@ from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.fusion.cloud_fuser import CloudFuser
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.fuser import Fuser
+from mcap_landmarks.fusion.object_motions import ObjectMotions
 from mcap_landmarks.fusion.scene_markers import markers_from_scene
 from mcap_landmarks.fusion.selection import at_least, usable, wanted
 from mcap_landmarks.fusion.thesis import fuse_in_order
@@ -40,12 +42,14 @@ _UNUSABLE = "scan objects without a finite place"
 def process(
     bundles: Iterable[Bundle], config: FuseConfig, resources: Mapping[str, Location]
 ) -> Iterator[Stamped | Omission]:
-    """A scene of every scan, with markers; detections that come to nothing are omissions.
+    """A scene of every scan, with markers and velocities; detections that come to nothing are omissions.
 
     Raises:
         RecordingError: no detections lie beside the scans, the camera is unknown, or transforms are missing.
     """
-    fusers, mounting = _Fusers(config, Fuser(config), CloudFuser(config)), Mounting(resources.get("extrinsics"))
+    motions = ObjectMotions()
+    fusers = _Fusers(config, Fuser(config), CloudFuser(config, motions))
+    mounting = Mounting(resources.get("extrinsics"))
     scans = images = 0
     for bundle in bundles:
         found = bundle.get(SCAN_OBJECTS)
@@ -55,8 +59,13 @@ def process(
         scans, images = scans + 1, images + (given is not None)
         detections, left_out = (None, Counter[str]()) if given is None else wanted(given, config)
         scene, unexplained = _fused(bundle, objects, detections, fusers, mounting)
+        scene, too_few = at_least(scene, config.min_objects)
         yield Stamped(SCENE_OBJECTS, bundle.log_time_ns, scene)
         yield Stamped(SCENE_MARKERS, bundle.log_time_ns, markers_from_scene(scene))
+        velocities = motions.add(scene, bundle.odometry)
+        if velocities is not None:
+            yield Stamped(SCENE_VELOCITIES, bundle.log_time_ns, velocities)
+        left_out.update(too_few)
         left_out.update({_UNEXPLAINED: unexplained, _UNUSABLE: len(found) - len(objects)})
         yield from (Omission(bundle.log_time_ns, reason) for reason in left_out.elements())
     if scans and not images:
@@ -81,14 +90,12 @@ def _fused(
     """The scene of a bundle, and the number of its boxes that come to nothing."""
     config, cloud = fusers.config, bundle.get(CLUSTERED_CLOUD)
     if config.method == "thesis":
-        scene, unexplained = fuse_in_order(objects, detections, config.image_centre_px)
-        return at_least(scene, config.min_objects), unexplained
+        return fuse_in_order(objects, detections, config.image_centre_px)
     view = None if detections is None else _view(bundle, detections, objects, mounting, config)
     odometry = None if bundle.odometry is None else bundle.odometry.odom_from_base
     if cloud is not None and cloud.stamp_ns == objects.stamp_ns:
         return fusers.clouds.add(cloud, detections, view, odometry)
-    scene, unexplained = fusers.planar.add(objects, detections, view, odometry)
-    return at_least(scene, config.min_objects), unexplained
+    return fusers.planar.add(objects, detections, view, odometry)
 
 
 def _view(
@@ -117,7 +124,7 @@ def _camera(info: CameraInfo, config: FuseConfig) -> CameraModel:
 STAGE = Stage(
     "fuse",
     reads=(SCAN_OBJECTS, CLUSTERED_CLOUD, DETECTIONS, CAMERA_INFO, TF_STATIC, ODOMETRY),
-    writes=(SCENE_OBJECTS, SCENE_MARKERS),
+    writes=(SCENE_OBJECTS, SCENE_MARKERS, SCENE_VELOCITIES),
     config=FuseConfig,
     process=process,
     optional=(CLUSTERED_CLOUD,),

@@ -1,5 +1,6 @@
 """Localize every bundle of scene objects in a landmark map."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 
@@ -13,6 +14,7 @@ from mcap_landmarks.channels import (
     POSE,
     POSE_COVARIANCE,
     SCENE_OBJECTS,
+    SCENE_VELOCITIES,
     TF,
     TF_STATIC,
 )
@@ -30,6 +32,7 @@ from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.database import read_map, read_neighbours
 from mcap_landmarks.maps.map_message import scene_from_map
 from mcap_landmarks.maps.model import LandmarkMap
+from mcap_landmarks.maps.scene_objects import standing
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.match import Status
 from mcap_landmarks.messages.poses import PoseStamped, PoseWithCovarianceStamped
@@ -52,25 +55,37 @@ def process(
     bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Location]
 ) -> Iterator[Stamped | Omission]:
     """Match and pose of every bundle, the map once before the first; a transform that cannot be is an omission."""
-    landmark_map = _usable_map(resources["map"])
+    landmark_map = _usable_map(resources["map"], config)
     locate, size = _method(resources["map"], landmark_map, config)
     stream, first = iter(bundles), True
     while batch := list(islice(stream, size)):
         if first:
             yield Stamped(MAP, batch[0].log_time_ns, scene_from_map(landmark_map, batch[0].stamp_ns))
             first = False
-        scenes = [scene for bundle in batch if (scene := bundle.get(SCENE_OBJECTS)) is not None]
-        for bundle, match in zip(batch, locate(scenes, [bundle.odometry for bundle in batch]), strict=True):
+        seen = [_standing(bundle, config) for bundle in batch]
+        matches = locate([scene for scene, _ in seen], [bundle.odometry for bundle in batch])
+        for bundle, match, (_, dropped) in zip(batch, matches, seen, strict=True):
+            yield from (Omission(bundle.log_time_ns, reason) for reason in dropped.elements())
             yield from _messages(bundle, match, landmark_map.frame, config)
 
 
-def _usable_map(path: Location) -> LandmarkMap:
+def _standing(bundle: Bundle, config: LocalizeConfig) -> tuple[SceneObjects, Counter[str]]:
+    """The objects of a bundle that can be landmarks, and why others are none."""
+    scene, velocities, dropped = bundle.messages[SCENE_OBJECTS], bundle.get(SCENE_VELOCITIES), Counter[str]()
+    assert isinstance(scene, SceneObjects)  # noqa: S101 - they make the bundle
+    moving = frozenset[str]() if velocities is None else velocities.moving_ids
+    return standing(scene, moving, dropped, fixed=config.fixed), dropped
+
+
+def _usable_map(path: Location, config: LocalizeConfig) -> LandmarkMap:
     """The map in a database, if a pose can be found in it.
 
     Raises:
         MapError: it cannot be read, or no pose can be found in it.
     """
     landmark_map = read_map(path)
+    if config.fixed:
+        landmark_map = landmark_map.without_movable()
     try:
         check_map(landmark_map)
     except MapError as error:
@@ -134,10 +149,11 @@ def _has_parent(log: InputLog, frame: str) -> bool:
 
 STAGE = Stage(
     "localize",
-    reads=(SCENE_OBJECTS, ODOMETRY),
+    reads=(SCENE_OBJECTS, ODOMETRY, SCENE_VELOCITIES),
     writes=(MAP, MATCH, POSE, POSE_COVARIANCE, TF),
     config=LocalizeConfig,
     process=process,
+    optional=(SCENE_VELOCITIES,),
     places={TF: _transforms_topic},
     resources=("map",),
     tolerance={
