@@ -35,7 +35,7 @@ class BoxGeometry:
 
     Bearings left, right and middle (M,) in rad about the camera, and half the angle between left and right; slopes top
     and bottom (M,), height over distance; sigma_rad and sigma_slope (M,) of an edge; `cut` (M, 4): left, top, right,
-    bottom is the image's edge.
+    bottom is the image's edge; `hidden` (M, 2): something before it has the left or right edge in its own box.
     """
 
     left: Array
@@ -47,6 +47,7 @@ class BoxGeometry:
     sigma_rad: Array
     sigma_slope: Array
     cut: NDArray[np.bool_]
+    hidden: NDArray[np.bool_]
 
     def covers(self, bearing_rad: float, margin_rad: float, of: NDArray[np.bool_]) -> bool:
         """Whether any of some boxes, by a mask (M,), reaches across a bearing, give or take a margin."""
@@ -78,7 +79,18 @@ def box_geometry(view: CameraView, boxes_xyxy: Array, config: FuseConfig) -> Box
         sigma_rad=np.abs(across) / wide * np.hypot(config.edge_px, config.edge_share * wide),
         sigma_slope=slope_per_px * np.hypot(config.edge_px, config.edge_share * high),
         cut=ends <= _EDGE_MARGIN_PX,
+        hidden=_hidden_sides(boxes_xyxy),
     )
+
+
+def _hidden_sides(boxes_xyxy: Array) -> NDArray[np.bool_]:
+    """Which left and right edges (M, 2) of boxes are in the box of something before theirs: that stands lower."""
+    x1, y1, x2, y2 = boxes_xyxy.T
+    before = (y2[None, :] > y2[:, None]) & (y1[None, :] < y2[:, None])
+    sides = [
+        (before & (edge[:, None] >= x1[None, :]) & (edge[:, None] <= x2[None, :])).any(axis=1) for edge in (x1, x2)
+    ]
+    return np.stack(sides, axis=1)
 
 
 def misfits(

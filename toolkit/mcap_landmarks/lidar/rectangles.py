@@ -33,6 +33,9 @@ _NEAR, _FAR, _MIDST = np.log(0.85), np.log(0.10), np.log(0.05)
 """Logarithms of how often the end that is seen is the one that faces the LiDAR, is the other one because something
 hides that, or neither."""
 _ANY_END = np.log(1 / 3)
+_FACE_M, _THROUGH = 0.5, np.log(0.01)
+"""Points that lie within less of each other along an axis are on one face, which is hardly ever the one that looks away
+from the LiDAR: that is only seen through windows. Points of the far end alone lie along another face."""
 _HIDDEN, _HIDDEN_SIGMAS = 0.2, 6.0
 """How often an object goes on behind an edge of its box in the image, since something hides it, and how far."""
 _SHORT, _SHORT_SIGMAS = 0.05, 6.0
@@ -75,7 +78,8 @@ class Rectangle:
 class BoxEdges:
     """The edges of a box in an image as bearings left and right in rad, about `camera_xy` (2,), with their sigma.
 
-    An edge that is the image's own is `cut` (left, right): the object may go on behind it.
+    An edge that is the image's own, or that of something before the object, is `cut` (left, right): the object may go
+    on behind it.
     """
 
     camera_xy: Array
@@ -168,7 +172,8 @@ def _placed(ends: Array, lidar: Array, measure_m: tuple[float, float], steps: Ar
     middle = np.where(which == 0, low + sizes / 2, np.where(which == 1, high - sizes / 2, (low + high) / 2))
     before, behind = lidar[:, None] < low, lidar[:, None] > high
     facing = np.where(before, which == 0, which == 1)
-    log_end = np.where(before | behind, np.where(facing, _NEAR, np.where(which == 2, _MIDST, _FAR)), _ANY_END)
+    away = np.where(high - low < _FACE_M, _THROUGH, _FAR)
+    log_end = np.where(before | behind, np.where(facing, _NEAR, np.where(which == 2, _MIDST, away)), _ANY_END)
     beyond = np.maximum(high - low - sizes, 0.0) / _BEYOND_M
     return _Ends(middle, usual + log_end - np.minimum(beyond**2 / 2, _STRAY)), sizes
 
