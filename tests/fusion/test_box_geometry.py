@@ -229,3 +229,10 @@ def test_nothing_is_nearer_than_a_hand() -> None:
     aside, sigma, above = misfit(seen(box(0.1, 0.1, -0.1, -0.1)), ANY, (0.0, 0.0))
     assert np.isfinite([*aside, *sigma, *above]).all()
     assert sigma[0] == pytest.approx(0.06 / 0.05, rel=0.01)
+
+
+def test_an_edge_in_the_box_of_something_before_is_hidden() -> None:
+    near, behind = box(0.3, 0.1, 0.1, -0.2), box(0.2, 0.05, 0.0, -0.1)
+    aside, above = box(-0.2, 0.05, -0.3, -0.1), box(0.15, 0.4, 0.12, 0.15)
+    hidden = seen(near, behind, aside, above).hidden
+    assert hidden.tolist() == [[False, False], [True, False], [False, False], [False, False]]

@@ -20,7 +20,7 @@ from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import OdometryAt
 
-from tests.lidar.clouds import AHEAD, Solid, cloud
+from tests.lidar.clouds import AHEAD, ALL_AROUND, Solid, cloud
 
 SIZE_PX = (1200, 400)
 CAMERA_M = 1.65
@@ -134,6 +134,18 @@ def test_a_track_keeps_the_class_that_most_boxes_say() -> None:
         np.testing.assert_allclose(scene.positions_xy, [[CAR.x, CAR.y]], atol=0.4)
     assert ids == {"1"}
     assert classes == [("car",)] * 4
+
+
+def test_what_the_image_cuts_goes_on_beside_it() -> None:
+    """A LiDAR sees all of a car that is driven past; its rear alone could lie any way."""
+    beside = Solid(5.0, -4.0, 4.3, 1.75, 1.5)
+    assert box_of(beside)[2] == SIZE_PX[0]
+    points = cloud([beside], ALL_AROUND)[0]
+    found = whole_cloud(points, np.zeros(2), ClusterConfig())
+    around = ClusteredCloud(10**9, "base_link", found.points_m, found.heights_m, found.clusters)
+    view = CameraView.at(CAMERA, BASE_FROM_CAMERA, np.zeros(3), 0.0)
+    scene, _ = CloudFuser(FuseConfig(), ObjectMotions()).add(around, detections([("car", 0.8, beside)]), view, None)
+    np.testing.assert_allclose(scene.positions_xy, [[beside.x, beside.y]], atol=0.3)
 
 
 def test_without_an_image_or_points_the_scene_is_empty() -> None:

@@ -13,6 +13,7 @@ from mcap_landmarks.fusion.camera_view import CameraView
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.frustum import CloudView, Piece, Upright, core, loose, pieces
 from mcap_landmarks.fusion.seen_things import Seen
+from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array, transform_points
 from mcap_landmarks.lidar.rectangles import BoxEdges, Rectangle, completed
 
@@ -158,6 +159,7 @@ def _of_piece(
     inside = cloud.within(loose(thing.box_xyxy))
     away = float(np.median(cloud.ranges_m[piece.points]))
     near = np.abs(cloud.ranges_m - away) < _reach(look, box, name, away)
+    inside |= _beside(look, box)
     points = np.flatnonzero(low & inside & near & (cloud.clusters == cloud.clusters[piece.points[0]]))
     points = np.union1d(points, piece.points)
     place = place_of(look, box, name, points)
@@ -170,6 +172,14 @@ def _of_piece(
     around = np.flatnonzero(is_free & near)
     taken = around[place.holds(cloud.points_xy[around], _MARGIN_M / 2)]
     return FoundObject(box, _probability(look, thing, piece.weight), place, points), np.union1d(points, taken)
+
+
+def _beside(look: Look, box: int) -> NDArray[np.bool_]:
+    """Which points (N,) of the cloud are beside the image, where the image cuts a box: the object goes on there."""
+    off = wrap(look.cloud.bearings_rad - look.boxes.middle[box])
+    left, right = look.boxes.cut[box, [0, 2]].tolist()
+    beyond: NDArray[np.bool_] = ((off > 0) & left) | ((off < 0) & right)
+    return beyond & ~look.cloud.is_inside
 
 
 def _probability(look: Look, thing: Seen, weight: float) -> float:

@@ -33,11 +33,11 @@ _BEHIND_M = 12.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CloudView:
-    """What a camera sees of a cloud: N points above the ground that are in the image.
+    """What a camera sees of a cloud: N points above the ground of clusters that are in the image.
 
     points_xy (N, 2) in the base frame at the scan's time, heights_m (N,) above the local ground, whose own heights are
-    floors_m (N,), and clusters (N,); at the image's time pixels (N, 2), and level ranges_m and bearings_rad (N,) from
-    the camera.
+    floors_m (N,), and clusters (N,); at the image's time pixels (N, 2), not a number beside the image, and level
+    ranges_m and bearings_rad (N,) from the camera.
     """
 
     points_xy: Array
@@ -50,14 +50,16 @@ class CloudView:
 
     @classmethod
     def of(cls, cloud: ClusteredCloud, view: CameraView) -> Self:
-        """What of a cloud is in an image, or little beside it."""
+        """What of a cloud is in an image, or of a cluster that is in it, or little beside it."""
         points = cloud.points_m.astype(np.float64)
         away = view.from_camera(points[:, :2])
         then = np.column_stack([away + view.base_from_camera[:2, 3], points[:, 2]])
         pixels = view.camera.project(frames.apply(frames.inverse(view.base_from_camera), then))
         beside = _BESIDE * np.array(view.camera.size_px)
         with np.errstate(invalid="ignore"):
-            shown = ((pixels >= -beside) & (pixels <= view.camera.size_px + beside)).all(axis=1)
+            inside = ((pixels >= -beside) & (pixels <= view.camera.size_px + beside)).all(axis=1)
+        pixels[~inside] = np.nan
+        shown = np.isin(cloud.clusters, np.unique(cloud.clusters[inside]))
         heights, away = cloud.heights_m[shown].astype(np.float64), away[shown]
         return cls(
             points[shown, :2],
@@ -68,6 +70,12 @@ class CloudView:
             np.hypot(away[:, 0], away[:, 1]),
             np.arctan2(away[:, 1], away[:, 0]),
         )
+
+    @property
+    def is_inside(self) -> NDArray[np.bool_]:
+        """Which points (N,) are in the image."""
+        inside: NDArray[np.bool_] = np.isfinite(self.pixels[:, 0])
+        return inside
 
     def within(self, box_xyxy: Array) -> NDArray[np.bool_]:
         """Which points (N,) are in a box."""
@@ -142,7 +150,7 @@ def pieces(view: CloudView, thing: Seen, is_free: NDArray[np.bool_], upright: Up
         away = float(np.median(view.ranges_m[points]))
         share = len(points) / len(inner)
         cluster = view.clusters == view.clusters[points[0]]
-        near = cluster & (np.abs(view.ranges_m - away) < _BEHIND_M)
+        near = cluster & (np.abs(view.ranges_m - away) < _BEHIND_M) & view.is_inside
         whole = float((near & outer).sum()) / float(near.sum())
         weight = share * (_WHOLE + (1 - _WHOLE) * whole) * upright.weight(away, float(np.median(view.floors_m[points])))
         weight *= np.exp(-max(away - nearest, 0.0) / _BEHIND_M)

@@ -33,7 +33,7 @@ _NEAR, _FAR, _MIDST = np.log(0.85), np.log(0.10), np.log(0.05)
 """Logarithms of how often the end that is seen is the one that faces the LiDAR, is the other one because something
 hides that, or neither."""
 _ANY_END = np.log(1 / 3)
-_FACE_M, _THROUGH = 0.5, np.log(0.01)
+_FACE_M, _THROUGH = 0.5, np.log(0.001)
 """Points that lie within less of each other along an axis are on one face, which is hardly ever the one that looks away
 from the LiDAR: that is only seen through windows. Points of the far end alone lie along another face."""
 _HIDDEN, _HIDDEN_SIGMAS = 0.2, 6.0
