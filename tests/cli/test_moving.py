@@ -55,7 +55,8 @@ def test_parked_cars_become_the_map_and_nothing_that_moves(
 
 def test_a_map_of_what_is_fixed_has_no_cars(fused: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     message = refused(capsys, 1, "map", fused, "--map", tmp_path / "map.db", "--fixed")
-    assert "no bundle holds an object" in message or "holds no object" in message
+    assert "holds no object in any bundle with odometry that could be a landmark" in message
+    assert "objects that may stand elsewhere another day: car" in message
 
 
 def test_localizing_counts_what_moves(fused: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -79,3 +80,13 @@ def test_fixed_maps_are_refused_where_nothing_is(
     assert call("map", fused, "--map", tmp_path / "map.db") == 0
     command = "localize", fused, "--map", tmp_path / "map.db", "-o", tmp_path / "out.mcap", "--fixed"
     assert "landmark" in refused(capsys, 1, *command)
+
+
+def test_a_street_where_nothing_stands_still_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A map of what moves would be sure and wrong."""
+    log = tmp_path / "traffic.mcap"
+    write_street(log, DRIVING[:2], 3.0)
+    assert call("run", log, "-o", tmp_path / "fused.mcap", *SCAN, "--stages", "cluster,fuse") == 0
+    message = refused(capsys, 1, "map", tmp_path / "fused.mcap", "--map", tmp_path / "map.db")
+    assert "objects that move: car" in message
+    assert not (tmp_path / "map.db").exists()

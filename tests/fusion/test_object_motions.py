@@ -44,7 +44,7 @@ def test_a_car_that_drives_keeps_its_id_and_has_its_velocity() -> None:
         assert names == ("1", "2")
     assert velocities is not None
     assert velocities.ids == ("1", "2")
-    assert velocities.moving.tolist() == [True, False]
+    assert velocities.moving.tolist() == [1.0, 0.0]
     assert velocities.moving_ids == {"1"}
     # The robot looks to the left of its way: what comes towards it along x goes to its left.
     np.testing.assert_allclose(velocities.velocities_mps, [[0.0, 12.0], [0.0, 0.0]], atol=1e-9)
@@ -58,7 +58,7 @@ def test_parked_cars_that_are_missed_now_and_then_stay_themselves() -> None:
     again, velocities = follower.see(row)
     assert again == first
     assert velocities is not None
-    assert not velocities.moving.any()
+    assert not velocities.moving_ids
 
 
 def test_a_person_is_none_of_the_cars() -> None:

@@ -68,8 +68,7 @@ def scene_objects(draw: st.DrawFn) -> SceneObjects:
 def scene_velocities(draw: st.DrawFn) -> SceneVelocities:
     ids = draw(st.lists(text, max_size=4).map(tuple))
     n = len(ids)
-    moving = draw(arrays(np.bool_, (n,)))
-    return SceneVelocities(draw(stamp), draw(text), ids, draw(vector(n, 2)), draw(vector(n, 2, 2)), moving)
+    return SceneVelocities(draw(stamp), draw(text), ids, draw(vector(n, 2)), draw(vector(n, 2, 2)), draw(vector(n)))
 
 
 @st.composite

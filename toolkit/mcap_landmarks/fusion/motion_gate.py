@@ -51,7 +51,7 @@ def _density(motion: TrackMotion, name: str, stamp_ns: int, places: Array, covar
     """How likely an object is to be at places (N, 2), per m^2."""
     last, since_s = motion.last, (stamp_ns - motion.last.stamp_ns) / 1e9
     spread = covariances + last.covariance + _WANDER_M**2 * np.eye(2)
-    if motion.moves and motion.velocity is not None:
+    if motion.moving == 1.0 and motion.velocity is not None:
         return _normal(
             places - last.place_xy - since_s * motion.velocity.xy_mps, spread + since_s**2 * motion.velocity.covariance
         )

@@ -6,7 +6,7 @@ import numpy as np
 
 from mcap_landmarks.classes import speed_mps
 from mcap_landmarks.fusion.motion_gate import match
-from mcap_landmarks.fusion.track_motion import Place, TrackMotion
+from mcap_landmarks.fusion.track_motion import TrackPlace, TrackMotion
 from mcap_landmarks.geometry.se2 import Array, rotation, transform_points
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.velocities import SceneVelocities
@@ -53,7 +53,7 @@ class ObjectMotions:
         for i, name in enumerate(scene.ids):
             motion = self._motions.setdefault(name, TrackMotion())
             at = odometry.way_m, odometry.turned_rad, float(ranges[i])
-            motion.note(Place(scene.stamp_ns, places[i], covariances[i], *at), speed_mps(scene.classes[i]))
+            motion.note(TrackPlace(scene.stamp_ns, places[i], covariances[i], *at), speed_mps(scene.classes[i]))
             self._classes[name] = scene.classes[i]
         back = rotation(-odometry.odom_from_base[2])
         told = [(name, motion, motion.velocity) for name in scene.ids if (motion := self._motions[name]).velocity]
@@ -63,7 +63,7 @@ class ObjectMotions:
             tuple(name for name, _, _ in told),
             np.array([back @ velocity.xy_mps for _, _, velocity in told if velocity]).reshape(-1, 2),
             np.array([back @ velocity.covariance @ back.T for _, _, velocity in told if velocity]).reshape(-1, 2, 2),
-            np.array([motion.moves for _, motion, _ in told], dtype=np.bool_),
+            np.array([motion.moving for _, motion, _ in told], dtype=np.float64),
         )
 
     def _forget(self, stamp_ns: int) -> None:

@@ -12,7 +12,8 @@ _WINDOW_NS, _MOST = 2 * 10**9, 20
 _LEAST_NS = 10**8
 """Over a shorter time no velocity is told."""
 _LEAST_PLACES = 4
-"""Fewer places in a line may be of several objects, each seen once: a row of parked cars, as one drives by."""
+"""Fewer places in a line may be of several objects, each seen once: a row of parked cars, as one drives by. With more
+it is sure that something moves."""
 _LEAST_MPS = 0.3
 """Slower than this is as good as standing: the middle of an object wanders as more of it comes into view."""
 _MOVING, _STRAYING, _STRAYING_MPS = 0.3, 0.01, 1.0
@@ -20,6 +21,8 @@ _MOVING, _STRAYING, _STRAYING_MPS = 0.3, 0.01, 1.0
 what the network takes for something else."""
 _ODDS = 100.0
 """So much likelier must it be that something moves than that it stands, since every object is asked at every scan."""
+_UNSURE = 0.99
+"""Fewer places, or lesser odds, never make it surer than this that something moves."""
 _STRAIGHT = 0.9
 """Share of the variance of places that a constant velocity explains, if it is one: a place that jumps has 0.75."""
 
@@ -29,7 +32,7 @@ grows with the root of the way, and a share of the turning. Wheels that slip on 
 of these."""
 
 
-class Place(NamedTuple):
+class TrackPlace(NamedTuple):
     """Where an object was: place_xy (2,) in the odometry frame with covariance (2, 2), how far from the robot, and how
     far that had driven and turned by then.
     """
@@ -50,19 +53,19 @@ class Velocity(NamedTuple):
 
 
 class TrackMotion:
-    """The last places of one object; `moves` is true once it moved."""
+    """The last places of one object, its velocity, and how probable it is that it moves: 1 once it surely did."""
 
     def __init__(self) -> None:
-        self.moves = False
+        self.moving = 0.0
         self.velocity: Velocity | None = None
-        self._places: list[Place] = []
+        self._places: list[TrackPlace] = []
 
     @property
-    def last(self) -> Place:
+    def last(self) -> TrackPlace:
         """Where it was last."""
         return self._places[-1]
 
-    def note(self, place: Place, speed_mps: float) -> None:
+    def note(self, place: TrackPlace, speed_mps: float) -> None:
         """Another place, later than those before, of something of a class that is usually so fast."""
         since = place.stamp_ns - _WINDOW_NS
         self._places = [one for one in self._places[1 - _MOST :] if one.stamp_ns >= since] + [place]
@@ -90,8 +93,13 @@ class TrackMotion:
         left = off - since[:, None] * velocity
         whole = float(weights @ (off**2).sum(axis=1))
         straight = float(weights @ (left**2).sum(axis=1)) <= (1 - _STRAIGHT) * whole
-        enough = len(places) >= _LEAST_PLACES and np.hypot(*velocity) >= _LEAST_MPS
-        self.moves = self.moves or bool(enough and straight and _odds(self.velocity, speed_mps) >= _ODDS)
+        self._judge(self.velocity, speed_mps, straight=straight)
+
+    def _judge(self, velocity: Velocity, speed_mps: float, *, straight: bool) -> None:
+        """Say how probable it is that the object moves; of what does so in no line nothing is known."""
+        odds = _odds(velocity, speed_mps) if straight and np.hypot(*velocity.xy_mps) >= _LEAST_MPS else 0.0
+        sure = self.moving == 1.0 or (odds >= _ODDS and len(self._places) >= _LEAST_PLACES)
+        self.moving = 1.0 if sure else odds / (1 + odds) * _UNSURE
 
     def _drift(self) -> float:
         """The variance in m^2 of what odometry makes an object seem to move, between the first place and the last."""

@@ -1,5 +1,6 @@
 """The default way to build a map: a submap of each log, all merged, then poses and landmarks solved together."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -58,9 +59,14 @@ def _check_seen(logs: Sequence[LogObservations]) -> None:
     Raises:
         MapError: as it says.
     """
-    empty = [str(i + 1) for i, log in enumerate(logs) if not len(log.bundle)]
+    empty = [i for i, log in enumerate(logs) if not len(log.bundle)]
     if empty:
-        raise MapError(f"log {', '.join(empty)} holds no object in any bundle with odometry; leave it out")
+        dropped = sum((Counter(logs[i].dropped) for i in empty), Counter[str]())
+        why = f" ({', '.join(f'{count} {reason}' for reason, count in sorted(dropped.items()))})" if dropped else ""
+        numbers = ", ".join(str(i + 1) for i in empty)
+        raise MapError(
+            f"log {numbers} holds no object in any bundle with odometry that could be a landmark{why}; leave it out"
+        )
 
 
 def _placed(prior: LandmarkMap, id_of_class: Mapping[str, int]) -> tuple[Ints, Array]:

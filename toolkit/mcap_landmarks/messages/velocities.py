@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcap_landmarks.messages.parts import (
     Array,
@@ -17,13 +16,15 @@ from mcap_landmarks.messages.parts import (
 )
 from mcap_landmarks.messages.typestore import RosObject
 
+_RATHER = 0.5
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneVelocities:
     """N objects of the scene with the same stamp, by their ids: those that were followed for long enough.
 
     velocities_mps (N, 2) over the ground, along the axes of `frame_id`, with covariances (N, 2, 2) in m^2/s^2; `moving`
-    (N,) is true for what moves or has moved since it is followed.
+    (N,) is how probable it is that they move; it stays 1 for what surely did since it is followed.
     """
 
     ROS_TYPE: ClassVar[str] = "mcap_landmarks_msgs/msg/SceneVelocities"
@@ -33,15 +34,15 @@ class SceneVelocities:
     ids: tuple[str, ...]
     velocities_mps: Array
     covariances: Array
-    moving: NDArray[np.bool_]
+    moving: Array
 
     def __len__(self) -> int:
         return len(self.ids)
 
     @property
     def moving_ids(self) -> frozenset[str]:
-        """The ids of what moves or has moved."""
-        return frozenset(name for name, moving in zip(self.ids, self.moving, strict=True) if moving)
+        """The ids of what rather moves than stands."""
+        return frozenset(name for name, moving in zip(self.ids, self.moving.tolist(), strict=True) if moving >= _RATHER)
 
     def to_ros(self) -> RosObject:
         """See `Message`."""
@@ -50,7 +51,7 @@ class SceneVelocities:
             header=header_to_ros(self.stamp_ns, self.frame_id),
             ids=list(self.ids),
             velocities=[_twist_to_ros(*entry) for entry in zip(self.velocities_mps, self.covariances, strict=True)],
-            moving=np.asarray(self.moving, dtype=np.bool_),
+            moving=np.ascontiguousarray(self.moving, dtype=np.float64),
         )
 
     @classmethod
@@ -64,7 +65,7 @@ class SceneVelocities:
             tuple(ros.ids),
             velocities.reshape(-1, 2),
             covariances.reshape(-1, 2, 2),
-            np.array(ros.moving, dtype=np.bool_),
+            np.array(ros.moving, dtype=np.float64),
         )
 
 

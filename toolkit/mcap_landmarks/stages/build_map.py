@@ -19,11 +19,9 @@ from mcap_landmarks.stage import Bundle, OdometryAt, Reduction, Tolerance
 
 
 def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservations:
-    """What one log saw: its bundles that have odometry, and their objects; nothing that moves at any time."""
+    """What one log saw: its bundles that have odometry, and their objects, but for those that move."""
     kept, seen, odometry, count = _usable(bundles)
-    velocities = [found for bundle in kept if (found := bundle.get(SCENE_VELOCITIES)) is not None]
-    moving, dropped = frozenset[str]().union(*(found.moving_ids for found in velocities)), Counter[str]()
-    scenes = [standing(scene, moving, dropped, fixed=config.fixed) for scene in seen]
+    scenes, dropped = _standing(kept, seen, config)
     sizes = [len(scene) for scene in scenes]
     spread = [known_covariances(scene, config.range_sigma_m, config.bearing_sigma_rad) for scene in scenes]
     return LogObservations(
@@ -40,6 +38,19 @@ def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservation
         count,
         dropped=dropped,
     )
+
+
+def _standing(
+    bundles: Iterable[Bundle], scenes: Iterable[SceneObjects], config: BuildMapConfig
+) -> tuple[list[SceneObjects], Counter[str]]:
+    """Scenes without what rather moves than stands by the end of its track, when most is known of it; and how many."""
+    moving, dropped = set[str](), Counter[str]()
+    for bundle in bundles:
+        velocities = bundle.get(SCENE_VELOCITIES)
+        if velocities is not None:
+            moving -= {*velocities.ids}
+            moving |= velocities.moving_ids
+    return [standing(scene, moving, dropped, fixed=config.fixed) for scene in scenes], dropped
 
 
 def _usable(bundles: Iterable[Bundle]) -> tuple[list[Bundle], list[SceneObjects], list[OdometryAt], int]:
@@ -62,7 +73,7 @@ def solve(logs: Sequence[LogObservations], prior: LandmarkMap | None, config: Bu
     Raises:
         MapError: nothing was seen, a log cannot be joined to the others, or the solver did not converge.
     """
-    if not any(len(log.bundle) for log in logs):
+    if not any(len(log.bundle) or log.dropped for log in logs):
         raise MapError("no bundle holds an object; a map needs scene objects")
     if config.method == "thesis":
         return solve_as_in_the_thesis(logs)
