@@ -13,7 +13,7 @@ from mcap_landmarks.vision.families import family_names, find_family
 from mcap_landmarks.vision.family import ModelLayout, Signature
 from mcap_landmarks.vision.onnx_session import Tensor, open_session
 
-from tests.vision.networks import Export, yolov5
+from tests.vision.networks import Export, answering, yolov5
 
 CLASSES = ["person", "car"]
 INPUT_PX = (64, 96)
@@ -24,14 +24,30 @@ def written(folder: Path, export: Export) -> Path:
     return folder / "m.onnx"
 
 
+def random_answer(*shapes: tuple[int, ...], half: bool = False) -> Callable[[Path], Path]:
+    """A network whose outputs of such shapes are random shares, whatever it sees."""
+
+    def make(folder: Path) -> Path:
+        rng = np.random.default_rng(0)
+        outputs = {f"output{i}": rng.random(shape).astype("f2" if half else "f4") for i, shape in enumerate(shapes)}
+        return answering(folder / "m.onnx", outputs, {"names": str(CLASSES)}, (1, 3, *INPUT_PX))
+
+    return make
+
+
 SAMPLES: dict[str, list[Callable[[Path], Path]]] = {
+    "nanodet": [
+        random_answer((1, 96 + 24 + 6, 2 + 4 * 11)),
+        random_answer((1, 96 + 24 + 6 + 2, 2 + 4 * 8), half=True),
+        random_answer(*((1, cells, columns) for columns in (2, 44) for cells in (96, 24, 6))),
+    ],
     "yolov5": [
         lambda folder: written(folder, Export(*INPUT_PX)),
         lambda folder: written(folder, Export("h", "w")),
         lambda folder: written(folder, Export(*INPUT_PX, form="heads")),
         lambda folder: written(folder, Export(*INPUT_PX, form="planes")),
         lambda folder: written(folder, Export(*INPUT_PX, half=True)),
-    ]
+    ],
 }
 """Models of two classes that take an input of 64 x 96, of every layout that a family knows."""
 EACH = [pytest.param(name, make, id=f"{name}-{i}") for name in family_names() for i, make in enumerate(SAMPLES[name])]

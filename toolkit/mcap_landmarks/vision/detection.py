@@ -68,8 +68,8 @@ def prepare(rgb: Rgb, detector: Detector, config: DetectConfig) -> Prepared:
     """An image as the detector takes it."""
     height, width = rgb.shape[:2]
     input_px = input_size(detector, (height, width), config)
-    letterbox = detector.family.place((height, width), input_px)
-    return Prepared(rgb, letterbox, tensor(rgb, letterbox, input_px, detector.dtype, detector.family.colours))
+    letterbox = detector.layout.place((height, width), input_px)
+    return Prepared(rgb, letterbox, tensor(rgb, letterbox, input_px, detector.dtype, detector.layout.colours))
 
 
 def find(

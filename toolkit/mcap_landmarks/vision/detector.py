@@ -15,6 +15,10 @@ from mcap_landmarks.vision.family import DetectionCandidates, Family, ModelLayou
 from mcap_landmarks.vision.metadata import confidence_of, names_of
 from mcap_landmarks.vision.onnx_session import FLOATS, OnnxSession, fits, written
 
+_EXPORT = (
+    "export it again (yolo export model=FILE.pt format=onnx; YOLOv5: python export.py --weights FILE.pt --include onnx)"
+)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detector:
@@ -97,10 +101,12 @@ def _recognised(signature: Signature, names: tuple[str, ...]) -> tuple[Family, M
         else:
             expected.append(f"{layout} ({family.title})")
     if not found:
+        if signature.image_px() is None:
+            expected = [f"an input {written((1, 3, None, None))} {' or '.join(FLOATS)}"]
         raise ModelError(
             f"{signature.path}: not a detector of {signature.classes} classes: found input "
             f"{', '.join(map(str, signature.inputs))} and output {', '.join(map(str, signature.outputs))}; expected "
-            f"{'; or '.join(expected)}; export it again, or give the right --names FILE"
+            f"{'; or '.join(expected)}; {_EXPORT}, or give the right --names FILE"
         )
     if len(found) > 1:
         could_be = " or ".join(f"{family.name} ({family.title})" for family, _ in found)

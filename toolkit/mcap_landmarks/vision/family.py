@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from mcap_landmarks.locations import Location
 from mcap_landmarks.vision.letterbox import Boxes, Colours, Letterbox, fit
 from mcap_landmarks.vision.metadata import literal
-from mcap_landmarks.vision.onnx_session import Shape, Tensor
+from mcap_landmarks.vision.onnx_session import FLOATS, Shape, Tensor, fits
+
+ImageSides = tuple[int | None, int | None]
+"""Height and width in pixels, None where free."""
+
+
+def takes_images(entry: Tensor) -> bool:
+    """Whether an input takes one colour image of any size."""
+    return fits(entry.shape, (1, 3, None, None)) and entry.dtype in FLOATS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,18 +58,31 @@ class Signature:
         own = literal(self.path, self.metadata, key)
         return self.assumed.get(key) if own is None else own
 
+    def image_px(self, stride_px: int = 1) -> ImageSides | None:
+        """The (height, width) of the images that the first input takes, None where free; None if it takes none.
+
+        A side that is not in whole `stride_px` is none.
+        """
+        if not self.inputs or not takes_images(self.inputs[0]):
+            return None
+        height, width = self.inputs[0].shape[2:]
+        return (height, width) if not any(side and side % stride_px for side in (height, width)) else None
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelLayout(ABC):
     """The inputs and outputs of one model of a family.
 
     `input_px` is (height, width), None where free; a free side is chosen in whole `stride_px`. The image is the first
-    input; every other one is a constant by name.
+    input; every other one is a constant by name. `colours` says how it is normalised, and `place` puts an image
+    (height, width) into an input (height, width).
     """
 
-    input_px: tuple[int | None, int | None]
+    input_px: ImageSides
     stride_px: int
     constants: Mapping[str, NDArray[Any]] = field(default_factory=dict, kw_only=True)
+    colours: Colours = field(default_factory=Colours, kw_only=True)
+    place: Callable[[tuple[int, int], tuple[int, int]], Letterbox] = field(default=fit, kw_only=True)
 
     @abstractmethod
     def outputs(self, input_px: tuple[int, int]) -> tuple[Shape, ...]:
@@ -83,13 +104,10 @@ class Family:
 
     `title` names them in messages. `recognise` gives the layout of a model of the family; for any other it says, in the
     words of an error, what the family expects in place of what is there. `needs_nms`: several boxes of one object are
-    to be expected. `place` puts an image (height, width) into an input (height, width), and `colours` says how it is
-    normalised.
+    to be expected.
     """
 
     name: str
     title: str
     recognise: Callable[[Signature], ModelLayout | str]
     needs_nms: bool
-    colours: Colours = field(default_factory=Colours)
-    place: Callable[[tuple[int, int], tuple[int, int]], Letterbox] = fit

@@ -1,5 +1,6 @@
 """Letterbox: an image scaled into a network's input with its sides kept in proportion, and boxes taken back."""
 
+import dataclasses
 from dataclasses import dataclass
 from typing import Literal
 
@@ -57,6 +58,17 @@ def fit(image_px: tuple[int, int], input_px: tuple[int, int]) -> Letterbox:
     inner_height, inner_width = max(size for size in sizes if size[0] <= height and size[1] <= width)
     left, top = (width - inner_width) // 2, (height - inner_height) // 2
     return Letterbox(inner_width, inner_height, left, top, image_width, image_height)
+
+
+def fit_top_left(image_px: tuple[int, int], input_px: tuple[int, int]) -> Letterbox:
+    """The letterbox of an image (height, width) at the top left of an input (height, width)."""
+    return dataclasses.replace(fit(image_px, input_px), left_px=0, top_px=0)
+
+
+def stretched(image_px: tuple[int, int], input_px: tuple[int, int]) -> Letterbox:
+    """An image (height, width) that fills an input (height, width), its sides not kept in proportion."""
+    (image_height, image_width), (height, width) = image_px, input_px
+    return Letterbox(width, height, 0, 0, image_width, image_height)
 
 
 def fitted_input(image_px: tuple[int, int], size_px: int, stride_px: int) -> tuple[int, int]:

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import ModelError
-from mcap_landmarks.vision.family import DetectionCandidates, Family, ModelLayout, Signature
-from mcap_landmarks.vision.onnx_session import FLOATS, Shape, Tensor, fits, written
+from mcap_landmarks.vision.families._candidates import boxes_around, candidates_above
+from mcap_landmarks.vision.family import DetectionCandidates, Family, ImageSides, ModelLayout, Signature
+from mcap_landmarks.vision.onnx_session import Shape, Tensor, fits, written
 
 Anchors = NDArray[np.float32]
 """Widths and heights of the anchor boxes (heads, 3, 2) in pixels of the input."""
@@ -87,9 +88,7 @@ def strides(coarsest_px: int) -> tuple[int, ...]:
     return tuple(_FINEST_STRIDE_PX << i for i in range((coarsest_px // _FINEST_STRIDE_PX).bit_length()))
 
 
-def output_shapes(
-    form: Form, input_px: tuple[int | None, int | None], stride_px: int, classes: int
-) -> tuple[Shape, ...]:
+def output_shapes(form: Form, input_px: ImageSides, stride_px: int, classes: int) -> tuple[Shape, ...]:
     """The shapes of the outputs of a model with so many classes; None where a free input leaves them free."""
     height, width = input_px
     if form == "decoded":
@@ -130,10 +129,7 @@ def scored(rows: NDArray[np.float32], thresholds: NDArray[np.float32]) -> Detect
     class_ids = rows[:, 5:].argmax(axis=1)
     with np.errstate(invalid="ignore", over="ignore"):  # a broken network's numbers are sorted out below
         scores = rows[:, 4] * rows[np.arange(len(rows)), 5 + class_ids]
-    good = (scores > thresholds[class_ids]) & np.isfinite(rows[:, :4]).all(axis=1) & np.isfinite(scores)
-    centres, halves = rows[good, 0:2], rows[good, 2:4] / 2
-    boxes = np.concatenate([centres - halves, centres + halves], axis=1)
-    return DetectionCandidates(boxes, scores[good], class_ids[good])
+    return candidates_above(boxes_around(rows[:, :4]), scores, class_ids, thresholds)
 
 
 def _sigmoid(values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -143,13 +139,12 @@ def _sigmoid(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def _form(signature: Signature, stride_px: int) -> Form | None:
-    inputs, outputs = signature.inputs, signature.outputs
-    if len(inputs) != 1 or not _takes_images(inputs[0], stride_px):
+    outputs, input_px = signature.outputs, signature.image_px(stride_px)
+    if len(signature.inputs) != 1 or input_px is None:
         return None
-    height, width = inputs[0].shape[2:]
     forms: tuple[Form, ...] = ("decoded", "heads", "planes")
     for form in forms:
-        expected = output_shapes(form, (height, width), stride_px, signature.classes)
+        expected = output_shapes(form, input_px, stride_px, signature.classes)
         # Old exports give the raw heads behind the decoded output, too.
         found = outputs[:1] if form == "decoded" and _is_old(outputs) else outputs
         if len(found) == len(expected) and all(map(fits, (entry.shape for entry in found), expected)):
@@ -157,26 +152,16 @@ def _form(signature: Signature, stride_px: int) -> Form | None:
     return None
 
 
-def _takes_images(entry: Tensor, stride_px: int) -> bool:
-    """Whether an input takes images in whole strides."""
-    if not fits(entry.shape, (1, 3, None, None)) or entry.dtype not in FLOATS:
-        return False
-    return all(side is None or side % stride_px == 0 for side in entry.shape[2:])
-
-
 def _is_old(outputs: Sequence[Tensor]) -> bool:
     return len(outputs) > 1 and len(outputs[0].shape) == 3 and all(len(entry.shape) == 5 for entry in outputs[1:])
 
 
 def _expected(signature: Signature, stride_px: int) -> str:
-    shape = signature.inputs[0].shape if len(signature.inputs) == 1 else ()
-    size = (shape[2], shape[3]) if len(shape) == 4 else (None, None)
+    size = signature.image_px() or (None, None)
     decoded = written(output_shapes("decoded", size, stride_px, signature.classes)[0])
     heads = ", ".join(map(written, output_shapes("heads", size, stride_px, signature.classes)))
-    return (
-        f"one input {written((1, 3, *size))} {' or '.join(FLOATS)} (sides in multiples of {stride_px}) and output "
-        f"{decoded}, or raw heads {heads}"
-    )
+    sides = "" if signature.image_px(stride_px) else f" (sides in multiples of {stride_px})"
+    return f"output {decoded}, or raw heads {heads}{sides}"
 
 
 def _anchors(signature: Signature, form: Form, stride_px: int) -> Anchors:
