@@ -2,7 +2,7 @@
 
 import importlib
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +12,9 @@ from mcap_landmarks.vision.detector import Detector, read_detector
 from mcap_landmarks.vision.families import family_names, find_family
 from mcap_landmarks.vision.family import ModelLayout, Signature
 from mcap_landmarks.vision.onnx_session import Tensor, open_session
+from numpy.typing import DTypeLike, NDArray
 
-from tests.vision.networks import Export, answering, yolov5
+from tests.vision.networks import NO_METADATA, Export, answering, yolov5
 
 CLASSES = ["person", "car"]
 INPUT_PX = (64, 96)
@@ -24,23 +25,47 @@ def written(folder: Path, export: Export) -> Path:
     return folder / "m.onnx"
 
 
-def random_answer(*shapes: tuple[int, ...], half: bool = False) -> Callable[[Path], Path]:
-    """A network whose outputs of such shapes are random shares, whatever it sees."""
+def constant_answer(
+    outputs: Sequence[NDArray[np.floating]], names: Sequence[str] = (), metadata: Mapping[str, str] = NO_METADATA
+) -> Callable[[Path], Path]:
+    """A network of these outputs, whatever it sees."""
+    named = dict(zip(names or [f"output{i}" for i in range(len(outputs))], outputs, strict=True))
+    every = {"names": str(CLASSES), **metadata}
+    return lambda folder: answering(folder / "m.onnx", named, every, (1, 3, *INPUT_PX))
 
-    def make(folder: Path) -> Path:
-        rng = np.random.default_rng(0)
-        outputs = {f"output{i}": rng.random(shape).astype("f2" if half else "f4") for i, shape in enumerate(shapes)}
-        return answering(folder / "m.onnx", outputs, {"names": str(CLASSES)}, (1, 3, *INPUT_PX))
 
-    return make
+def shares(*shapes: tuple[int, ...], dtype: DTypeLike = np.float32) -> list[NDArray[np.floating]]:
+    """Random outputs of such shapes."""
+    return [np.random.default_rng(i).random(shape).astype(dtype) for i, shape in enumerate(shapes)]
+
+
+def with_classes(shape: tuple[int, ...], column: int) -> list[NDArray[np.floating]]:
+    """The same with whole numbers of classes in a column."""
+    (output,) = shares(shape)
+    output[..., column] = np.arange(output[..., column].size) % len(CLASSES)
+    return [output]
 
 
 SAMPLES: dict[str, list[Callable[[Path], Path]]] = {
-    "nanodet": [
-        random_answer((1, 96 + 24 + 6, 2 + 4 * 11)),
-        random_answer((1, 96 + 24 + 6 + 2, 2 + 4 * 8), half=True),
-        random_answer(*((1, cells, columns) for columns in (2, 44) for cells in (96, 24, 6))),
+    "detr": [
+        constant_answer(shares((1, 300, 6)), metadata={"description": "Ultralytics rtdetr-l model"}),
+        constant_answer(shares((1, 300, 4), (1, 300, 2), dtype=np.float16), ("pred_boxes", "logits")),
+        constant_answer(shares((1, 300, 4), (1, 300, 2)), ("dets", "labels")),
     ],
+    "nms_in_graph": [
+        constant_answer(with_classes((1, 300, 6), 5), metadata={"description": "YOLO26n", "end2end": "True"}),
+        constant_answer(with_classes((100, 7), 5)),
+    ],
+    "nanodet": [
+        constant_answer(shares((1, 96 + 24 + 6, 2 + 4 * 11))),
+        constant_answer(shares((1, 96 + 24 + 6 + 2, 2 + 4 * 8), dtype=np.float16)),
+        constant_answer(shares(*((1, cells, columns) for columns in (2, 44) for cells in (96, 24, 6)))),
+    ],
+    "yolov8": [
+        constant_answer(shares((1, 4 + 2, 96 + 24 + 6))),
+        constant_answer(shares((1, 4 + 2, 96 + 24 + 6), dtype=np.float16)),
+    ],
+    "yolox": [constant_answer(shares((1, 96 + 24 + 6, 5 + 2)))],
     "yolov5": [
         lambda folder: written(folder, Export(*INPUT_PX)),
         lambda folder: written(folder, Export("h", "w")),
@@ -98,7 +123,8 @@ class TestModel:
         assert detector.family is find_family(name)
         session, two = detector.session, len(CLASSES)
         found = Signature(session.path, session.inputs, session.outputs, two, session.metadata)
-        layouts = {other: find_family(other).recognise(found) for other in family_names()}
+        counted = family_names() if found.stated is None else (found.stated,)
+        layouts = {other: find_family(other).recognise(found) for other in counted}
         assert [other for other, layout in layouts.items() if isinstance(layout, ModelLayout)] == [name]
 
     def test_its_outputs_have_the_shapes_of_its_layout(

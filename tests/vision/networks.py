@@ -177,8 +177,9 @@ def answering(
     input_shape: Sequence[Side | None] = (1, 3, 64, 64),
     *,
     inputs: Sequence[str] = ("images",),
+    sized: str = "",
 ) -> Path:
-    """Write a network that gives the same outputs whatever it sees."""
+    """Write a network that gives the same outputs whatever it sees; `sized` is an input of two numbers beside."""
     half = any(array.dtype == np.float16 for array in outputs.values())
     kind = TensorProto.FLOAT16 if half else TensorProto.FLOAT
     nodes, constants = [], [numpy_helper.from_array(np.asarray(0, np.float16 if half else np.float32), "zero")]
@@ -186,9 +187,15 @@ def answering(
     nodes.append(helper.make_node("Mul", ["mean", "zero"], ["nothing"]))
     for name, array in outputs.items():
         constants.append(numpy_helper.from_array(array, f"{name}_content"))
-        nodes.append(helper.make_node("Add", [f"{name}_content", "nothing"], [name]))
+        whole = np.issubdtype(array.dtype, np.integer)
+        content = [f"{name}_content"]
+        nodes.append(
+            helper.make_node("Identity" if whole else "Add", content if whole else [*content, "nothing"], [name])
+        )
     given = [helper.make_tensor_value_info(name, kind, input_shape) for name in inputs]
-    found = [helper.make_tensor_value_info(name, kind, a.shape) for name, a in outputs.items()]
+    given += [helper.make_tensor_value_info(sized, TensorProto.INT64, [1, 2])] if sized else []
+    kinds = {name: helper.np_dtype_to_tensor_dtype(array.dtype) for name, array in outputs.items()}
+    found = [helper.make_tensor_value_info(name, kinds[name], a.shape) for name, a in outputs.items()]
     _save(path, helper.make_graph(nodes, "answering", given, found, constants), metadata)
     return path
 

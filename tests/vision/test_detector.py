@@ -72,8 +72,8 @@ def test_other_networks_are_refused_with_their_shapes(tmp_path: Path) -> None:
     assert "yolo export model=FILE.pt format=onnx" in line
     masks = {"output0": rows(252, 39), "output1": np.zeros((1, 32, 16, 16), np.float32)}
     assert "output1 [1, 32, 16, 16]" in refusal(answering(tmp_path / "seg.onnx", masks, NAMES))
-    ended = answering(tmp_path / "nms.onnx", {"output": np.zeros((100, 7), np.float32)}, NAMES)
-    assert "[100, 7]" in refusal(ended)
+    pose = answering(tmp_path / "pose.onnx", {"output0": np.zeros((1, 56, 84), np.float32)}, NAMES)
+    assert "[1, 56, 84]" in refusal(pose)
     grey = answering(tmp_path / "grey.onnx", {"output0": rows()}, NAMES, (1, 1, 64, 64))
     assert "found input images [1, 1, 64, 64]" in refusal(grey)
     assert "expected an input [1, 3, ?, ?] float or float16; export" in refusal(grey)

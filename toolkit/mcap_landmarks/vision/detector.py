@@ -81,15 +81,17 @@ def read_detector(session: OnnxSession, names_file: Location | None, config: Det
     names = names_of(session, names_file)
     assumed = {"anchors": config.anchors}
     signature = Signature(session.path, session.inputs, session.outputs, len(names), session.metadata, assumed)
-    family, layout = _recognised(signature, _asked_for(config.family))
+    family, layout = _recognised(signature, _asked_for(config.family, signature))
     return Detector(session, family, layout, names, confidence_of(session, names))
 
 
-def _asked_for(name: str | None) -> tuple[str, ...]:
+def _asked_for(name: str | None, signature: Signature) -> tuple[str, ...]:
+    """The families that count: the one configured, else the one that the metadata name, else all."""
     known = family_names()
     if name is not None and name not in known:
         raise UsageError(f"detect.family = {name}: there is no such family of detectors; there are {', '.join(known)}")
-    return known if name is None else (name,)
+    only = name or signature.stated
+    return (only,) if only in known else known
 
 
 def _recognised(signature: Signature, names: tuple[str, ...]) -> tuple[Family, ModelLayout]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.locations import Location
 from mcap_landmarks.vision.letterbox import Boxes, Colours, Letterbox, fit
-from mcap_landmarks.vision.metadata import literal
+from mcap_landmarks.vision.metadata import literal, stated_family
 from mcap_landmarks.vision.onnx_session import FLOATS, Shape, Tensor, fits
 
 ImageSides = tuple[int | None, int | None]
@@ -57,6 +57,11 @@ class Signature:
         """
         own = literal(self.path, self.metadata, key)
         return self.assumed.get(key) if own is None else own
+
+    @property
+    def stated(self) -> str | None:
+        """The family that the metadata name, None if they name none."""
+        return stated_family(self.metadata)
 
     def image_px(self, stride_px: int = 1) -> ImageSides | None:
         """The (height, width) of the images that the first input takes, None where free; None if it takes none.

@@ -23,6 +23,22 @@ def literal(path: Location, metadata: Mapping[str, str], key: str) -> object:
         raise ModelError(f"{path}: {key} in the metadata is {text[:60]!r}; export the model again") from error
 
 
+def stated_family(metadata: Mapping[str, str]) -> str | None:
+    """The family that metadata name: our own entry `family`, or what Ultralytics' exporter says of the model's head.
+
+    Its entries: `description`, of models that end in NMS `end2end` or an `nms` among `args`, and lately `head`. Those
+    of YOLOv5's own exporter are the names and the stride alone, and name no family.
+    """
+    if "family" in metadata or "description" not in metadata:
+        return metadata.get("family")
+    description = metadata["description"].lower()
+    if metadata.get("head") == "RTDETRDecoder" or "detr" in description:
+        return "detr"
+    # YOLOv10's first exporter wrote no `end2end`.
+    ends = metadata.get("end2end", str("yolov10" in description)) == "True"
+    return "nms_in_graph" if ends or "'nms': True" in metadata.get("args", "") else "yolov8"
+
+
 def names_of(session: OnnxSession, names_file: Location | None) -> tuple[str, ...]:
     """The class names by class id: lines of a file, else the metadata's `names`.
 

@@ -1,5 +1,7 @@
 """Candidates of tables of scores and boxes, as every family makes them in the end."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,3 +37,19 @@ def candidates_above(
     """The N boxes whose score is above the threshold of their class (classes,), where all numbers are finite."""
     good = (scores > thresholds[class_ids]) & np.isfinite(boxes_xyxy).all(axis=1) & np.isfinite(scores)
     return DetectionCandidates(boxes_xyxy[good], scores[good], class_ids[good])
+
+
+def candidates_by_objectness(rows: NDArray[np.float32], thresholds: NDArray[np.float32]) -> DetectionCandidates:
+    """Candidates of rows (N, 5 + classes): centre, size, objectness, class probabilities."""
+    class_ids = rows[:, 5:].argmax(axis=1)
+    with np.errstate(invalid="ignore", over="ignore"):  # a broken network's numbers are sorted out below
+        scores = rows[:, 4] * rows[np.arange(len(rows)), 5 + class_ids]
+    return candidates_above(boxes_around(rows[:, :4]), scores, class_ids, thresholds)
+
+
+def candidates_of_classes(
+    boxes_xyxy: Boxes, scores: NDArray[np.float32], class_ids: NDArray[Any], thresholds: NDArray[np.float32]
+) -> DetectionCandidates:
+    """The same where the network chose the classes (N,) itself: numbers that are none of ours are left out."""
+    known = (class_ids >= 0) & (class_ids < len(thresholds))
+    return candidates_above(boxes_xyxy[known], scores[known], class_ids[known].astype(np.intp), thresholds)

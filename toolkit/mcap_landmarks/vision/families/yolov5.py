@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.errors import ModelError
-from mcap_landmarks.vision.families._candidates import boxes_around, candidates_above
+from mcap_landmarks.vision.families._candidates import candidates_by_objectness
 from mcap_landmarks.vision.family import DetectionCandidates, Family, ImageSides, ModelLayout, Signature
 from mcap_landmarks.vision.onnx_session import Shape, Tensor, fits, written
 
@@ -54,12 +54,12 @@ class AnchorLayout(ModelLayout):
         lowest = float(thresholds.min())
         if self.form == "decoded":
             rows = outputs[0][0]
-            return scored(rows[rows[:, 4] > lowest].astype(np.float32), thresholds)
+            return candidates_by_objectness(rows[rows[:, 4] > lowest].astype(np.float32), thresholds)
         rows_by_head = []
         for stride_px, anchors, (raw, *_) in zip(strides(self.stride_px), self.anchors, outputs, strict=True):
             split = split_planes(raw, 5 + self.classes) if self.form == "planes" else raw
             rows_by_head.append(head_rows(split, stride_px, anchors, lowest))
-        return scored(np.concatenate(rows_by_head), thresholds)
+        return candidates_by_objectness(np.concatenate(rows_by_head), thresholds)
 
 
 def recognise(signature: Signature) -> AnchorLayout | str:
@@ -122,14 +122,6 @@ def head_rows(raw: NDArray[Any], stride_px: int, anchors: Anchors, lowest: float
     rows[:, 0:2] = (rows[:, 0:2] * 2 - np.float32(0.5) + cells) * np.float32(stride_px)
     rows[:, 2:4] = (rows[:, 2:4] * 2) ** 2 * anchors[anchor]
     return rows
-
-
-def scored(rows: NDArray[np.float32], thresholds: NDArray[np.float32]) -> DetectionCandidates:
-    """Candidates of rows (N, 5 + classes): centre, size, objectness, class probabilities."""
-    class_ids = rows[:, 5:].argmax(axis=1)
-    with np.errstate(invalid="ignore", over="ignore"):  # a broken network's numbers are sorted out below
-        scores = rows[:, 4] * rows[np.arange(len(rows)), 5 + class_ids]
-    return candidates_above(boxes_around(rows[:, :4]), scores, class_ids, thresholds)
 
 
 def _sigmoid(values: NDArray[np.float32]) -> NDArray[np.float32]:
