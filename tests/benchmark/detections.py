@@ -54,7 +54,8 @@ class Detector:
         Scores are in units of their class's threshold: `SHIPPED` is where the stage cuts.
         """
         prepared = prepare(image, self._model, self._config)
-        found = find(self._model.run(prepared.array), prepared, self._model, self._above, self._config)
+        outputs = [self._model.run(part.array) for part in prepared]
+        found = find(outputs, prepared, self._model, self._above, self._config)
         scores = found.scores.astype(float) / self._shipped[found.class_ids]
         return Found(found.boxes_xyxy, scores, found.class_ids.astype(np.int64))
 

@@ -196,7 +196,7 @@ def test_refusals(tmp_path: Path, model: Path, capsys: pytest.CaptureFixture[str
     blind = write(tmp_path / "blind.mcap", [info(CAMERA_INFO.topic)])
     for code, said, words in (
         (1, "no.onnx: cannot be read", (log, "--model", tmp_path / "no.onnx")),
-        (1, "expected one input [1, 3, 64, 64]", (log, "--model", other)),
+        (1, "expected output [1, ?, 5]", (log, "--model", other)),
         (1, "no image (sensor_msgs/msg/CompressedImage or sensor_msgs/msg/Image)", (blind, "--model", model)),
         (2, "did you mean confidence", (log, "--model", model, "--set", "detect.confidense=0.1")),
         (2, "detects no cat", (log, "--model", model, "--set", "detect.classes=['cat']")),
@@ -207,3 +207,27 @@ def test_refusals(tmp_path: Path, model: Path, capsys: pytest.CaptureFixture[str
         assert len(lines) == 1, lines
         assert said in lines[0]
         assert not out.exists()
+
+
+def one_car(folder: Path, family: str) -> Path:
+    """A detector of an input of 64 x 64 that sees one car of 32 x 24 around (30, 36), as models of a family say it."""
+    boxes, scores, classes = np.zeros((1, 100, 4), np.float32), np.zeros((1, 100), np.float32), np.zeros((1, 100), "i4")
+    boxes[0, 0], scores[0, 0], classes[0, 0] = (14, 24, 46, 48), 0.9, 1
+    head = np.zeros((1, 6, 84), np.float32)
+    head[0, :, 0] = 30, 36, 32, 24, 0, 0.9
+    count = np.ones((1, 1), np.int32)
+    outputs = {
+        "yolov8": {"output0": head},
+        "nms_in_graph": {"num_dets": count, "det_boxes": boxes, "det_scores": scores, "det_classes": classes},
+    }
+    return answering(folder / "model.onnx", outputs[family], {"names": "['person', 'car']", "stride": "32"})
+
+
+@pytest.mark.parametrize("family", ["yolov8", "nms_in_graph"])
+def test_models_of_other_families_detect(tmp_path: Path, family: str) -> None:
+    out = detected(tmp_path, one_car(tmp_path, family), images(count=2))
+    with open_recording(out) as recording:
+        raws = recording.messages(recording.connections(DETECTIONS.topic))
+        found = [decode(Detections, raw.data) for raw in raws]
+    assert [one.boxes_xyxy.tolist() for one in found] == [[[14, 16, 46, 40]]] * 2  # eight pixels of margin above
+    assert [one.hypotheses[0][0][0] for one in found] == ["car", "car"]

@@ -82,7 +82,7 @@ def test_its_models_are_found_and_detect(toy: Path) -> None:
 
 def test_it_says_how_images_are_fed(toy: Path) -> None:
     rgb = np.tile(np.array([50, 40, 30], np.uint8), (32, 128, 1))
-    array = prepare(rgb, detector(toy), DetectConfig()).array
+    array = prepare(rgb, detector(toy), DetectConfig())[0].array
     assert [np.unique(plane).tolist() for plane in array[0]] == [[20], [10], [5]]
 
 

@@ -46,8 +46,8 @@ def assert_equal_to_plain(detector: Detector, wanted: Sequence[Box], input_px: t
 def found_in(detector: Detector, image_px: tuple[int, int], rgb: tuple[int, int, int] = (10, 20, 30)) -> Found:
     """What it finds in an image (height, width) of one colour."""
     config = DetectConfig()
-    image = prepare(np.full((*image_px, 3), rgb, np.uint8), detector, config)
-    return find(detector.run(image.array), image, detector, THRESHOLDS, config)
+    prepared = prepare(np.full((*image_px, 3), rgb, np.uint8), detector, config)
+    return find([detector.run(part.array) for part in prepared], prepared, detector, THRESHOLDS, config)
 
 
 def corners(x: float, y: float, width: float, height: float) -> tuple[float, float, float, float]:

@@ -116,7 +116,7 @@ def test_outputs_for_an_image_size_that_is_given(tmp_path: Path) -> None:
 
 
 def colours_of(detector: Detector) -> list[float]:
-    array = prepare(np.full((480, 480, 3), (10, 20, 30), np.uint8), detector, DetectConfig()).array
+    array = prepare(np.full((480, 480, 3), (10, 20, 30), np.uint8), detector, DetectConfig())[0].array
     assert np.ptp(array, axis=(0, 2, 3)).max() == 0  # the whole input is image
     return [float(value) for value in array[0, :, 0, 0]]
 

@@ -124,11 +124,11 @@ def test_a_box_comes_back_to_the_image(tmp_path: Path) -> None:
     content[1][1][0, 2 * 7 + 3, [0, 11 + 1, 22 + 2, 33 + 0]] = 50  # left 0, top 1, right 2, bottom 0 strides
     detector = opened(tmp_path, by_stride(content, range(6)))
     config = DetectConfig()
-    image = prepare(np.full((144, 416, 3), (10, 20, 30), np.uint8), detector, config)
+    (image,) = prepare(np.full((144, 416, 3), (10, 20, 30), np.uint8), detector, config)
     outside = -np.array([103.53, 116.28, 123.675]) / [57.375, 57.12, 58.395]
     np.testing.assert_allclose(image.array[0, :, -1, -1], outside, rtol=1e-5)
     inside = (np.array([30, 20, 10]) - [103.53, 116.28, 123.675]) / [57.375, 57.12, 58.395]
     np.testing.assert_allclose(image.array[0, :, 35, -1], inside, rtol=1e-5)
-    found = find(detector.run(image.array), image, detector, THRESHOLDS, config)
+    found = find([detector.run(image.array)], [image], detector, THRESHOLDS, config)
     np.testing.assert_allclose(found.boxes_xyxy, [[56 * 4, 24 * 4, 88 * 4, 36 * 4]])
     assert (found.class_ids.tolist(), found.scores.tolist()) == ([1], [np.float32(0.9)])

@@ -57,7 +57,7 @@ def test_images_are_fed_as_they_are_blue_first_at_the_top_left(tmp_path: Path) -
     output = np.zeros((1, CELLS, 8), np.float32)
     output[0, 96 + 6 + 2] = 0.5, 0.25, math.log(2), 0, 0.9, 0.8, 0, 0  # centre (40, 20), 32 x 16
     detector = opened(tmp_path, {"output": output})
-    array = prepare(np.full((480, 960, 3), (10, 20, 30), np.uint8), detector, DetectConfig()).array
+    array = prepare(np.full((480, 960, 3), (10, 20, 30), np.uint8), detector, DetectConfig())[0].array
     assert array[0, :, 47, 95].tolist() == [30, 20, 10]
     assert array[0, :, 48, 0].tolist() == [114, 114, 114]
     found = found_in(detector, (480, 960))

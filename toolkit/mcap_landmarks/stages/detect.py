@@ -20,9 +20,12 @@ from mcap_landmarks.vision.config import THESIS_SIZE_PX, DetectConfig
 from mcap_landmarks.vision.detection import Found, Prepared, find, prepare, thresholds
 from mcap_landmarks.vision.detector import Detector, read_detector
 from mcap_landmarks.vision.onnx_session import open_session
-from mcap_landmarks.vision.pixels import rgb_from_message
+from mcap_landmarks.vision.pixels import Rgb, rgb_from_message
 from mcap_landmarks.vision.prefetch import in_order
 from mcap_landmarks.vision.review import Verdict, review
+
+_Image = tuple[Rgb, tuple[Prepared, ...]]
+"""An image and its parts on their way through the network."""
 
 
 def process(
@@ -52,9 +55,9 @@ def process(
             failed, error = failed + 1, error or result
             yield Omission(bundle.log_time_ns, str(result), lost=True)
             continue
-        image, outputs = result
-        found = find(outputs, image, detector, above, config)
-        yield from _messages(bundle, found, _verdicts(found, image, detector, classifier, config))
+        rgb, prepared, outputs = result
+        found = find(outputs, prepared, detector, above, config)
+        yield from _messages(bundle, found, _verdicts(found, rgb, detector, classifier, config))
     if error is not None and failed == read:
         raise RecordingError(f"none of {read} images could be read: {error}")
 
@@ -71,22 +74,22 @@ def _classifier(path: Location | None, detector: Detector, config: DetectConfig)
     return open_classifier(path, detector.names, colours, config.provider, config.threads)
 
 
-def _prepared(bundle: Bundle, detector: Detector, config: DetectConfig) -> Prepared | MessageError:
+def _prepared(bundle: Bundle, detector: Detector, config: DetectConfig) -> _Image | MessageError:
     message = bundle.messages[CAMERA_IMAGE]
     assert isinstance(message, Image | CompressedImage)  # noqa: S101 - the runner reads no other types as images
     try:
         rgb = rgb_from_message(message)
     except MessageError as error:
         return error
-    return prepare(rgb, detector, config)
+    return rgb, prepare(rgb, detector, config)
 
 
-def _run(image: Prepared | MessageError, detector: Detector) -> tuple[Prepared, list[NDArray[Any]]] | MessageError:
-    return image if isinstance(image, MessageError) else (image, detector.run(image.array))
+def _run(image: _Image | MessageError, detector: Detector) -> tuple[*_Image, list[list[NDArray[Any]]]] | MessageError:
+    return image if isinstance(image, MessageError) else (*image, [detector.run(part.array) for part in image[1]])
 
 
 def _verdicts(
-    found: Found, image: Prepared, detector: Detector, classifier: Classifier | None, config: DetectConfig
+    found: Found, rgb: Rgb, detector: Detector, classifier: Classifier | None, config: DetectConfig
 ) -> list[Verdict]:
     labels = [
         (detector.names[i], score) for i, score in zip(found.class_ids.tolist(), found.scores.tolist(), strict=True)
@@ -94,7 +97,7 @@ def _verdicts(
     if classifier is None:
         return [Verdict((label,)) for label in labels]
     action, sure = config.classifier_action, config.classifier_confidence
-    return review(classifier, image.rgb, found.boxes_xyxy, labels, action, sure)
+    return review(classifier, rgb, found.boxes_xyxy, labels, action, sure)
 
 
 def _messages(bundle: Bundle, found: Found, verdicts: Sequence[Verdict]) -> Iterator[Stamped | Omission]:

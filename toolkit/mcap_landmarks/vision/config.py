@@ -22,13 +22,15 @@ class DetectConfig:
     `confidence`: scores must be above it; unset, the model's own threshold, or 0.25. `class_confidence` overrules it by
     class name. Boxes of one class that overlap by more than `iou` are one, and an image has at most `max_detections`.
     `classes`: the only ones that are kept, all if empty. Where the model leaves its input free, an image's longer side
-    becomes `size_px`, and `shape` says whether the input is as small as the image allows or a square. `family` is the
-    kind of detector that the model is of, unset: the one whose outputs it has. `anchors` count for models of raw heads
-    whose metadata have none. `provider` runs the network, on the CPU in so many `threads` (0: one per core), each with
-    an image of its own. A second-stage classifier, where one is given, can veto or relabel (`classifier_action`) a box
-    for whose label it has another with a probability of `classifier_confidence`; it sees colours of 0 to 1 less
-    `classifier_mean`, divided by `classifier_std`. The thesis (Algorithm 1) has a square of 640, a threshold of 0.25,
-    no class filter, and a classifier whose objection is always a veto.
+    becomes `size_px`, and `shape` says whether the input is as small as the image allows or a square. With `tiles`
+    above 1 so many parts along the image's longer side, which overlap, are looked at beside the whole, with "auto" as
+    many as an image needs that would be shrunk much (`vision.tiles`): small objects are found, for more time. `family`
+    is the kind of detector that the model is of, unset: the one whose outputs it has. `anchors` count for models of raw
+    heads whose metadata have none. `provider` runs the network, on the CPU in so many `threads` (0: one per core), each
+    with an image of its own. A second-stage classifier, where one is given, can veto or relabel (`classifier_action`) a
+    box for whose label it has another with a probability of `classifier_confidence`; it sees colours of 0 to 1 less
+    `classifier_mean`, divided by `classifier_std`. The thesis (Algorithm 1) has a square of 640, one tile, a threshold
+    of 0.25, no class filter, and a classifier whose objection is always a veto.
     """
 
     method: Literal["default", "thesis"] = "default"
@@ -39,6 +41,7 @@ class DetectConfig:
     classes: tuple[str, ...] = ()
     size_px: Annotated[int, Field(ge=32, le=8192)] = 640
     shape: Literal["fitted", "square"] = "fitted"
+    tiles: Annotated[int, Field(ge=1, le=16)] | Literal["auto"] = 1
     family: str | None = None
     anchors: Literal["yolov5", "yolov7"] = "yolov5"
     provider: Literal["cpu", "cuda"] = "cpu"
@@ -57,6 +60,7 @@ class DetectConfig:
             classes=(),
             size_px=THESIS_SIZE_PX,
             shape="square",
+            tiles=1,
             classifier_action="veto",
             classifier_confidence=0.0,
         )
