@@ -55,6 +55,10 @@ SAMPLES: dict[str, list[Callable[[Path], Path]]] = {
     "nms_in_graph": [
         constant_answer(with_classes((1, 300, 6), 5), metadata={"description": "YOLO26n", "end2end": "True"}),
         constant_answer(with_classes((100, 7), 5)),
+        constant_answer(
+            [np.full((1, 1), 50.0, np.float32), *shares((1, 99, 4), (1, 99)), np.arange(99.0, dtype="f4")[None] % 2],
+            ("num_dets", "boxes", "scores", "classes"),
+        ),
     ],
     "nanodet": [
         constant_answer(shares((1, 96 + 24 + 6, 2 + 4 * 11))),

@@ -7,6 +7,7 @@ import pytest
 from mcap_landmarks.errors import ModelError, UsageError
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.detector import Detector, read_detector
+from mcap_landmarks.vision.metadata import stated_family
 from mcap_landmarks.vision.onnx_session import open_session
 
 from tests.vision.networks import Export, answering, yolov5
@@ -95,6 +96,30 @@ def test_metadata_that_make_no_sense(tmp_path: Path) -> None:
         ({**NAMES, "confidence": "{'dog': 0.5}"}, "confidence in its metadata"),
     ):
         assert said in refusal(answering(tmp_path / "m.onnx", {"output0": rows()}, metadata))
+
+
+def test_the_metadata_may_name_the_family() -> None:
+    for metadata, stated in (
+        ({}, None),
+        ({"names": "['a']", "stride": "32"}, None),
+        ({"family": "nanodet", "description": "Ultralytics YOLO11n model"}, "nanodet"),
+        ({"description": "Ultralytics YOLO11n model", "head": "Detect", "end2end": "False"}, "yolov8"),
+        ({"description": "Ultralytics YOLO11n model", "args": "{'batch': 1, 'nms': True}"}, "nms_in_graph"),
+        ({"description": "Ultralytics YOLO26n model", "end2end": "True"}, "nms_in_graph"),
+        ({"description": "Ultralytics YOLOv10n model trained on coco"}, "nms_in_graph"),
+        ({"description": "Ultralytics YOLOv10n model", "end2end": "False"}, "yolov8"),
+        ({"description": "Ultralytics rtdetr-l model", "end2end": "False"}, "detr"),
+    ):
+        assert stated_family(metadata) == stated
+
+
+def test_a_family_that_the_metadata_name_is_the_only_one(tmp_path: Path) -> None:
+    six = {"output0": np.zeros((1, 300, 6), np.float32)}
+    assert detector(answering(tmp_path / "a.onnx", six, {**NAMES, "family": "detr"})).family.name == "detr"
+    line = refusal(answering(tmp_path / "b.onnx", six, {**NAMES, "family": "yolov8"}))
+    assert "expected output [1, 6, 84] (YOLOv8 to 12); export" in line
+    unknown = answering(tmp_path / "c.onnx", {"output0": rows()}, {**NAMES, "family": "YOLO"})
+    assert detector(unknown).family.name == "yolov5"
 
 
 def test_a_family_that_does_not_exist(tmp_path: Path) -> None:

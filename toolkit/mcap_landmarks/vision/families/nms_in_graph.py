@@ -47,7 +47,7 @@ class SuppressedLayout(ModelLayout):
         if self.form == "parts":
             count, boxes, scores, class_ids = (outputs[i] for i in self.parts_at)
             # The rows behind those that count hold anything.
-            used = slice(0, max(0, int(count.ravel()[0])))
+            used = slice(0, max(0, int(np.nan_to_num(count).ravel()[0])))
             boxes, scores, class_ids = boxes[0, used], scores[0, used], class_ids[0, used]
         elif self.form == "six":
             boxes, scores, class_ids = np.split(outputs[0][0], [4, 5], axis=1)
