@@ -69,7 +69,7 @@ def test_other_networks_are_refused_with_their_shapes(tmp_path: Path) -> None:
     other = answering(tmp_path / "other.onnx", {"output0": np.zeros((1, 1000), np.float32)}, NAMES)
     line = refusal(other)
     assert "found input images [1, 3, 64, 64] float and output output0 [1, 1000] float" in line
-    assert "output [1, 252, 7], or raw heads [1, 3, 8, 8, 7], [1, 3, 4, 4, 7], [1, 3, 2, 2, 7] (YOLOv5" in line
+    assert "[1, 252, 7] or raw heads (YOLOv5 or YOLOv7); [1, 6, 84] (YOLOv8 to 12); [1, 84, 7] (YOLOX)" in line
     assert "yolo export model=FILE.pt format=onnx" in line
     masks = {"output0": rows(252, 39), "output1": np.zeros((1, 32, 16, 16), np.float32)}
     assert "output1 [1, 32, 16, 16]" in refusal(answering(tmp_path / "seg.onnx", masks, NAMES))
@@ -117,7 +117,7 @@ def test_a_family_that_the_metadata_name_is_the_only_one(tmp_path: Path) -> None
     six = {"output0": np.zeros((1, 300, 6), np.float32)}
     assert detector(answering(tmp_path / "a.onnx", six, {**NAMES, "family": "detr"})).family.name == "detr"
     line = refusal(answering(tmp_path / "b.onnx", six, {**NAMES, "family": "yolov8"}))
-    assert "expected output [1, 6, 84] (YOLOv8 to 12); export" in line
+    assert "expected [1, 6, 84] (YOLOv8 to 12); export" in line
     unknown = answering(tmp_path / "c.onnx", {"output0": rows()}, {**NAMES, "family": "YOLO"})
     assert detector(unknown).family.name == "yolov5"
 

@@ -108,7 +108,7 @@ def _recognised(signature: Signature, names: tuple[str, ...]) -> tuple[Family, M
         raise ModelError(
             f"{signature.path}: not a detector of {signature.classes} classes: found input "
             f"{', '.join(map(str, signature.inputs))} and output {', '.join(map(str, signature.outputs))}; expected "
-            f"{'; or '.join(expected)}; {_EXPORT}, or give the right --names FILE"
+            f"{'; '.join(expected)}; {_EXPORT}, or give the right --names FILE"
         )
     if len(found) > 1:
         could_be = " or ".join(f"{family.name} ({family.title})" for family, _ in found)

@@ -76,7 +76,7 @@ def recognise(signature: Signature) -> QueryLayout | str:
         if layout is not None:
             return layout
     rows, logits = (written((1, None, columns)) for columns in (4 + signature.classes, signature.classes))
-    return f"output {rows}, or boxes [1, ?, 4] and logits {logits}, or labels, boxes and scores"
+    return f"{rows}, or boxes [1, ?, 4] and logits {logits}, or labels, boxes and scores"
 
 
 def _rows(signature: Signature, input_px: ImageSides) -> QueryLayout | None:

@@ -80,8 +80,7 @@ def recognise(signature: Signature) -> DistributionLayout | str:
         layout = _of_one_output(signature, input_px) or _of_many_outputs(signature, input_px)
         if layout is not None:
             return layout
-    count, either = signature.classes, " or ".join(str(signature.classes + 4 * bins) for bins in _BINS)
-    return f"output [1, cells, {either}], or per stride [1, cells, {count}] and [1, cells, 4 * bins]"
+    return f"[1, cells, {signature.classes} + 4 * bins], or both parts per stride"
 
 
 def _of_one_output(signature: Signature, input_px: ImageSides) -> DistributionLayout | None:

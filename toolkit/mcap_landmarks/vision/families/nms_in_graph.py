@@ -69,7 +69,7 @@ def recognise(signature: Signature) -> SuppressedLayout | str:
         places = _parts(signature.outputs)
         if places:
             return SuppressedLayout(input_px, _STRIDES[-1], "parts", shapes, places)
-    return "output [1, boxes, 6], or num_dets, boxes, scores and classes"
+    return "[1, boxes, 6], or num_dets, boxes, scores and classes"
 
 
 def _is_six(signature: Signature, shape: Shape) -> bool:

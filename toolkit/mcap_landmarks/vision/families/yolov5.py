@@ -151,9 +151,8 @@ def _is_old(outputs: Sequence[Tensor]) -> bool:
 def _expected(signature: Signature, stride_px: int) -> str:
     size = signature.image_px() or (None, None)
     decoded = written(output_shapes("decoded", size, stride_px, signature.classes)[0])
-    heads = ", ".join(map(written, output_shapes("heads", size, stride_px, signature.classes)))
     sides = "" if signature.image_px(stride_px) else f" (sides in multiples of {stride_px})"
-    return f"output {decoded}, or raw heads {heads}{sides}"
+    return f"{decoded} or raw heads{sides}"
 
 
 def _anchors(signature: Signature, form: Form, stride_px: int) -> Anchors:

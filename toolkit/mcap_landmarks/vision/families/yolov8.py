@@ -45,7 +45,7 @@ def recognise(signature: Signature) -> AnchorFreeLayout | str:
     """The layout of a model with such an output, else what one of as many classes has."""
     outputs, input_px = signature.outputs, signature.image_px(32)
     count = count_of_cells(input_px or (None, None), _STRIDES[0])
-    expected = f"output {written((1, 4 + signature.classes, count))}"
+    expected = written((1, 4 + signature.classes, count))
     if input_px is None or len(signature.inputs) != 1 or len(outputs) != 1 or len(outputs[0].shape) != 3:
         return expected
     if outputs[0].shape[1] is None and signature.stated != "yolov8":

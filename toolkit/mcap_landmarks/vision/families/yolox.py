@@ -52,7 +52,7 @@ def recognise(signature: Signature) -> CellOffsetLayout | str:
     # Where sides are free the output is like YOLOv5's, whose exporter says the stride.
     is_told = outputs[0].shape[1] is not None or "stride" not in signature.metadata if is_one else False
     if input_px is None or not (is_told or (signature.stated == "yolox" and is_one)):
-        return f"output {written(shape)}"
+        return written(shape)
     return CellOffsetLayout(input_px, _STRIDES[-1], signature.classes, colours=_COLOURS, place=fit_top_left)
 
 
