@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mcap_landmarks.fusion.track_motion import TrackPlace, TrackMotion
+from mcap_landmarks.fusion.track_motion import TrackMotion, TrackPlace
 from mcap_landmarks.geometry.se2 import Array
 
 CAR_MPS, WALK_MPS = 10.0, 1.5

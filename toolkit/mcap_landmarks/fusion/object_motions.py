@@ -6,7 +6,7 @@ import numpy as np
 
 from mcap_landmarks.classes import speed_mps
 from mcap_landmarks.fusion.motion_gate import match
-from mcap_landmarks.fusion.track_motion import TrackPlace, TrackMotion
+from mcap_landmarks.fusion.track_motion import TrackMotion, TrackPlace
 from mcap_landmarks.geometry.se2 import Array, rotation, transform_points
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.velocities import SceneVelocities
