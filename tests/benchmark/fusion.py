@@ -9,11 +9,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from mcap_landmarks.fusion.camera_view import CameraView
+from mcap_landmarks.fusion.camera_view import SeenImage
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.fuser import Fuser
 from mcap_landmarks.geometry.se2 import Array
-from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.scan_objects import ScanObjects
 
 from tests.benchmark.rows import Row, main
@@ -51,8 +50,7 @@ class _Moment:
     """What a robot on the street has at one scan."""
 
     objects: ScanObjects
-    detections: Detections
-    view: CameraView
+    image: SeenImage
     odometry: Array
 
 
@@ -68,7 +66,7 @@ class Drive:
         moment = self._moment()
         self._scans += 1
         started = time.process_time()
-        self._fuser.add(moment.objects, moment.detections, moment.view, moment.odometry)
+        self._fuser.add(moment.objects, [moment.image], moment.odometry)
         return time.process_time() - started
 
     def _moment(self) -> _Moment:
@@ -83,8 +81,7 @@ class Drive:
         shown = [thing for thing in things.values() if thing.x > ASIDE_M]
         return _Moment(
             scanned(list(seen.values()), stamp_ns, list(seen)),
-            detected([thing.name for thing in shown], boxes(shown), stamp_ns),
-            camera_view(),
+            SeenImage(detected([thing.name for thing in shown], boxes(shown), stamp_ns), camera_view()),
             np.array([x, 0.0, 0.0]),
         )
 

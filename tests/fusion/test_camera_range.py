@@ -38,7 +38,9 @@ def test_the_ground_in_one_direction_is_that_of_the_points_there_also_across_the
         [bearings > 3.0, bearings < -3.0], [0.4, 0.6], 2.0
     )  # half a metre on both sides of the half turn
     nothing = np.zeros((400, 2))
-    view = CloudView(nothing, floors, floors, np.zeros(400, np.int32), nothing, np.tile(away[::4], 4), bearings)
+    view = CloudView(
+        nothing, floors, floors, np.zeros(400, np.int32), nothing, np.tile(away[::4], 4), bearings, np.arange(400)
+    )
     assert floor_along(view, np.pi) == (pytest.approx(0.5), pytest.approx(0.0))
     assert floor_along(view, -np.pi) == (pytest.approx(0.5), pytest.approx(0.0))
     assert floor_along(view, 0.0) == (pytest.approx(2.0), pytest.approx(0.0))

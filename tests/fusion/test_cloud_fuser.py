@@ -4,16 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from mcap_landmarks.fusion.camera_view import CameraView
-from mcap_landmarks.fusion.cloud_fuser import CloudFuser, _distinct
-from mcap_landmarks.fusion.cloud_objects import FoundObject
+from mcap_landmarks.fusion.camera_view import CameraView, SeenImage
+from mcap_landmarks.fusion.cloud_fuser import CloudFuser
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.object_motions import ObjectMotions
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.lidar.config import ClusterConfig
-from mcap_landmarks.lidar.rectangles import Rectangle
 from mcap_landmarks.lidar.whole_clouds import whole_cloud
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.detections import Detections
@@ -60,7 +58,7 @@ def fused(
 ) -> tuple[SceneObjects, int]:
     view = CameraView.at(CAMERA, BASE_FROM_CAMERA, np.zeros(3), 0.0)
     return (fuser or CloudFuser(FuseConfig(), ObjectMotions())).add(
-        clustered(solids), detections(told), view, odometry.get("odometry")
+        clustered(solids), [SeenImage(detections(told), view)], odometry.get("odometry")
     )
 
 
@@ -144,19 +142,21 @@ def test_what_the_image_cuts_goes_on_beside_it() -> None:
     found = whole_cloud(points, np.zeros(2), ClusterConfig())
     around = ClusteredCloud(10**9, "base_link", found.points_m, found.heights_m, found.clusters)
     view = CameraView.at(CAMERA, BASE_FROM_CAMERA, np.zeros(3), 0.0)
-    scene, _ = CloudFuser(FuseConfig(), ObjectMotions()).add(around, detections([("car", 0.8, beside)]), view, None)
+    scene, _ = CloudFuser(FuseConfig(), ObjectMotions()).add(
+        around, [SeenImage(detections([("car", 0.8, beside)]), view)], None
+    )
     np.testing.assert_allclose(scene.positions_xy, [[beside.x, beside.y]], atol=0.3)
 
 
 def test_without_an_image_or_points_the_scene_is_empty() -> None:
     fuser = CloudFuser(FuseConfig(), ObjectMotions())
-    scene, unexplained = fuser.add(clustered([CAR]), None, None, None)
+    scene, unexplained = fuser.add(clustered([CAR]), [], None)
     assert (len(scene), unexplained) == (0, 0)
     nothing = ClusteredCloud(
         1, "base_link", np.zeros((0, 3), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int32)
     )
     view = CameraView.at(CAMERA, BASE_FROM_CAMERA, np.zeros(3), 0.0)
-    scene, _ = fuser.add(nothing, detections([]), view, None)
+    scene, _ = fuser.add(nothing, [SeenImage(detections([]), view)], None)
     assert len(scene) == 0
 
 
@@ -174,7 +174,7 @@ def test_what_only_the_camera_places_stands_on_the_sloping_ground_as_tall_as_its
     beside = [Solid(24.0, 5.0, 1.0, 1.0, 1.5), Solid(34.0, 3.0, 1.0, 1.0, 1.5), Solid(8.0, 1.9, 0.6, 0.6, 1.0)]
     ground = clustered(beside, slope=(slope, 0.0))
     scene, unexplained = CloudFuser(FuseConfig(), ObjectMotions()).add(
-        ground, detections([("person", 0.8, far)]), view, None
+        ground, [SeenImage(detections([("person", 0.8, far)]), view)], None
     )
     assert (scene.classes, unexplained) == (("person",), 0)
     assert scene.boxes is not None
@@ -189,12 +189,3 @@ def test_something_round_is_surer_across_the_view_than_along_it() -> None:
     across, along = np.linalg.eigvalsh(scene.covariances[0])
     assert np.sqrt(across) == pytest.approx(0.1)
     assert np.sqrt(along - across) == pytest.approx(scene.radii_m[0] / 2)
-
-
-def test_of_two_objects_in_one_place_the_one_with_points_stays() -> None:
-    def found(box: int, score: float, points: int) -> FoundObject:
-        return FoundObject(box, score, Rectangle(np.array([9.0, 1.0]), 1.0, 1.0, 0.0, np.eye(2)), np.arange(points))
-
-    by_camera, weak, strong = found(0, 0.9, 0), found(1, 0.4, 1), found(2, 0.6, 30)
-    assert _distinct([by_camera, weak]) == [weak]
-    assert _distinct([by_camera, weak, strong]) == [strong]

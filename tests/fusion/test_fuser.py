@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 from mcap_landmarks.channels import DETECTIONS, SCAN_OBJECTS
+from mcap_landmarks.fusion.camera_view import SeenImage
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.fuser import Fuser
 from mcap_landmarks.geometry.se2 import Array
@@ -207,9 +208,9 @@ def step(
 ) -> tuple[SceneObjects, int]:
     """A scan, and boxes of an image at the same time, if there is one."""
     if named is None:
-        return fuser.add(scanned(seen, SECOND), None, None, odometry)
+        return fuser.add(scanned(seen, SECOND), [], odometry)
     given = detected([thing.name for thing in named], boxes(named), SECOND, score)
-    return fuser.add(scanned(seen, SECOND), given, camera_view(), odometry)
+    return fuser.add(scanned(seen, SECOND), [SeenImage(given, camera_view())], odometry)
 
 
 def probabilities(scene: SceneObjects) -> list[float]:
@@ -332,9 +333,9 @@ def test_a_track_that_comes_back_is_told_of_as_of_the_last_image(with_image: boo
             del local["far"]
         elif 6 <= i < last:
             del local["near"]
-        image = (given, camera_view()) if with_image or i < last else (None, None)
+        images = [SeenImage(given, camera_view())] if with_image or i < last else []
         objects = scanned(list(local.values()), SECOND, list(local))
         odometry = np.array([0.3 * i, 0.0, 0.0]) if with_odometry or i < last else None
-        scene, _ = fuser.add(objects, *image, odometry)
+        scene, _ = fuser.add(objects, images, odometry)
     assert scene.ids == ("beside", "far")
     assert fuser._tracks["near"].belief.best()[0] == "fire hydrant"

@@ -104,11 +104,16 @@ class Channel(Generic[M_co]):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stamped:
-    """A message on its way into a recording."""
+    """A message on its way into a recording.
+
+    `frame_id` is that of the image, scan or the like that it was made from, where its channel may have a topic for each
+    of several sensors.
+    """
 
     channel: Channel[Message]
     log_time_ns: int
     message: Message
+    frame_id: str = ""
 
     def get(self, channel: Channel[M]) -> M | None:
         """The message, None if it is not one of a channel."""
@@ -156,17 +161,26 @@ class OdometryAt:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bundle:
-    """What belongs to one moment: the messages associated with it, by channel, and the odometry at its stamp."""
+    """What belongs to one moment: the messages associated with it, by channel, and the odometry at its stamp.
+
+    `several` has all messages of the channels that have more than one, of several cameras.
+    """
 
     stamp_ns: int
     log_time_ns: int
     messages: Mapping[Channel[Message], Message]
     odometry: OdometryAt | None = None
+    several: Mapping[Channel[Message], tuple[Message, ...]] = field(default_factory=dict)
 
     def get(self, channel: Channel[M]) -> M | None:
         """The bundle's message of a channel, None if it has none."""
         message = self.messages.get(channel)
         return message if isinstance(message, channel.message) else None
+
+    def each(self, channel: Channel[M]) -> list[M]:
+        """The bundle's messages of a channel, one for each camera that has any, in the order of their frames."""
+        found = self.several.get(channel) or (self.messages.get(channel),)
+        return [message for message in found if isinstance(message, channel.message)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +227,7 @@ Process = Callable[[Iterable[Bundle], Any, Mapping[str, Location]], Iterator[Sta
 """Results of bundles, of the stage's configuration (an object of its own dataclass) and of its files by name."""
 
 Place = Callable[[InputLog, Any], str | LeftOut]
-"""Of a log and the stage's configuration, the topic that a channel gets there."""
+"""Of a log and the stage's configuration, the topic that a channel gets there; asked for each of several cameras."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, table
-from mcap_landmarks.cli.option_groups import LogOptions
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.locations import Location, location
 
@@ -22,9 +22,12 @@ def command(
     output: options.Output,
     given: LogOptions,
     extrinsics: options.Extrinsics = None,
+    image: options.ImageTopics = None,
 ) -> None:
     """Give the objects in the scans of LOG... the classes that its detections have; write the input with scenes."""
-    runs = run_over("fuse", ["fuse"], logs, output, Given(given, files={"extrinsics": extrinsics}))
+    runs = run_over(
+        "fuse", ["fuse"], logs, output, Given(given, ImageOptions(image=image), files={"extrinsics": extrinsics})
+    )
     finish("fuse", runs, _document, _print, given.json)
 
 

@@ -37,9 +37,22 @@ class ImageOptions:
     """What verbs take that look at images."""
 
     model: options.Model = None
-    image: options.ImageTopic = None
+    image: options.ImageTopics = None
     image_rate: options.ImageRate = None
     every: options.Every = None
+
+    def topics(self) -> tuple[str | None, tuple[str, ...]]:
+        """The topic of the one camera, and those of several; `all` is of several.
+
+        Raises:
+            UsageError: `all` is not alone.
+        """
+        from mcap_landmarks.inspection.cameras import ALL
+
+        given = tuple(dict.fromkeys(self.image or ()))
+        if ALL in given and len(given) > 1:
+            raise UsageError(f"--image {ALL} takes every camera that has a CameraInfo; give it alone, or name topics")
+        return (given[0], ()) if len(given) == 1 and given != (ALL,) else (None, given)
 
     def thinning(self) -> "Thinning":
         """Which images are left out.

@@ -30,7 +30,15 @@ Start = Annotated[
 End = Annotated[str | None, typer.Option("--end", help="Log time to stop before: RFC 3339 or integer nanoseconds.")]
 Remap = Annotated[list[str] | None, typer.Option("--remap", metavar="FROM=TO", help="Read topic FROM as TO.")]
 OdometryTopic = Annotated[str | None, typer.Option("--odom", help="Odometry topic, where the log has several.")]
-ImageTopic = Annotated[str | None, typer.Option("--image", help="Image topic, where the log has several.")]
+ImageTopics = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--image",
+        metavar="TOPIC|all",
+        help="Image topic, where the log has several; several times for several cameras, all for every camera that has "
+        "a CameraInfo of its own.",
+    ),
+]
 ScanTopics = Annotated[
     list[str] | None, typer.Option("--scan", help="Scan topic, where the log has several; twice for two LiDARs.")
 ]

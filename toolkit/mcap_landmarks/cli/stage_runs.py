@@ -53,8 +53,10 @@ class Given:
         from mcap_landmarks.runs.bundles import Span
 
         given, scans = self.options, dict(zip(("scan", "second_scan"), self.scans.topics() or (), strict=False))
-        topics = {"odometry": given.odom, "image": self.images.image, **scans}
-        choice = Choice({role: topic for role, topic in topics.items() if topic}, parse_remaps(given.remap or []))
+        one, several = self.images.topics()
+        topics = {"odometry": given.odom, "image": one, **scans}
+        known = {role: topic for role, topic in topics.items() if topic}
+        choice = Choice(known, parse_remaps(given.remap or []), several)
         return Span(choice, time_ns(given.start, "--start"), time_ns(given.end, "--end"))
 
 

@@ -1,7 +1,7 @@
 """A camera on the robot: where things of a scan are to it, at the moment of its image."""
 
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.geometry.frames import apply
 from mcap_landmarks.geometry.se2 import Array, exp, inverse, transform_points
+from mcap_landmarks.messages.detections import Detections
 
 _CLOCK_S, _VELOCITY_SHARE = 0.01, 0.1
 """Stamps of camera and odometry agree to so much, and between a scan and an image the robot turns as odometry says to
@@ -52,3 +53,10 @@ class CameraView:
         with np.errstate(invalid="ignore"):
             inside = (pixels >= 0) & (pixels <= [width, height])
         return bool(inside.all()) and bool(pixels[0, 0] < pixels[1, 0] < pixels[2, 0])
+
+
+class SeenImage(NamedTuple):
+    """The detections in an image, and the camera's view of the scan that it lies beside."""
+
+    detections: Detections
+    view: CameraView

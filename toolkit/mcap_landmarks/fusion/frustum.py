@@ -36,8 +36,8 @@ class CloudView:
     """What a camera sees of a cloud: N points above the ground of clusters that are in the image.
 
     points_xy (N, 2) in the base frame at the scan's time, heights_m (N,) above the local ground, whose own heights are
-    floors_m (N,), and clusters (N,); at the image's time pixels (N, 2), not a number beside the image, and level
-    ranges_m and bearings_rad (N,) from the camera.
+    floors_m (N,), clusters (N,), and rows (N,), which points of the cloud they are; at the image's time pixels (N, 2),
+    not a number beside the image, and level ranges_m and bearings_rad (N,) from the camera.
     """
 
     points_xy: Array
@@ -47,6 +47,7 @@ class CloudView:
     pixels: Array
     ranges_m: Array
     bearings_rad: Array
+    rows: NDArray[np.intp]
 
     @classmethod
     def of(cls, cloud: ClusteredCloud, view: CameraView) -> Self:
@@ -69,6 +70,7 @@ class CloudView:
             pixels[shown],
             np.hypot(away[:, 0], away[:, 1]),
             np.arctan2(away[:, 1], away[:, 0]),
+            np.flatnonzero(shown),
         )
 
     @property

@@ -32,7 +32,7 @@ _LEAST_M = 0.1
 @dataclass(frozen=True, slots=True, eq=False)
 class BoxObservation:
     """A box in an image, in the odometry frame: where the camera was, in which direction its middle, and how wide it
-    may be off, in rad; its height over the distance, 0 if the image cuts it.
+    may be off, in rad; its height over the distance, 0 if the image cuts it; the frame of the camera.
 
     All places where what is in it can be, by its size, are within `reach_m` of `centre_xy` (2,).
     """
@@ -45,6 +45,7 @@ class BoxObservation:
     tall: float
     centre_xy: Array
     reach_m: float
+    frame_id: str = ""
 
 
 def observe(
@@ -104,8 +105,8 @@ class TrackHistory:
         latest = next((place for bundle, place in reversed(self.places.items()) if bundle <= until), None)
         if latest is None or not boxes:
             return np.zeros(len(boxes), dtype=np.bool_)
-        own = {box.bundle for box in self.boxes}
-        is_free = np.array([box.bundle not in own for box in boxes])
+        own = {(box.bundle, box.frame_id) for box in self.boxes}
+        is_free = np.array([(box.bundle, box.frame_id) not in own for box in boxes])
         x, y = np.array([self.places.get(box.bundle, latest) - box.camera_xy for box in boxes]).T
         bearing, sigma, tall = np.array([(box.bearing_rad, box.sigma_rad, box.tall) for box in boxes]).T
         distance = np.hypot(x, y)

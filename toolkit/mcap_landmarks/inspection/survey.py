@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.geometry.frames import plain
+from mcap_landmarks.inspection.cameras import frame_in
 from mcap_landmarks.inspection.open_logs import OpenLog
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.images import CameraInfo
@@ -134,7 +135,7 @@ def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
         _look_at_scan(decode(LaserScan, raw.data), sensor, found.returns)
     if number or ros_type == TFMessage.ROS_TYPE:
         return
-    sensor.frame = plain(_frame(raw.data))
+    sensor.frame = plain(frame_in(raw.data))
     if ros_type == Odometry.ROS_TYPE:
         found.bases.add(plain(decode(Odometry, raw.data).child_frame_id))
     elif ros_type == CameraInfo.ROS_TYPE and not decode(CameraInfo, raw.data).intrinsics[0, 0] > 0:
@@ -152,12 +153,6 @@ def _stamp_ns(data: bytes | memoryview) -> int:
         raise MessageError("it is shorter than a header")
     seconds, rest = (_LITTLE if data[1] & 1 else _BIG).unpack_from(data, 4)
     return int(seconds) * 10**9 + int(rest)
-
-
-def _frame(data: bytes | memoryview) -> str:
-    """The frame of a message that begins with a header."""
-    size = int.from_bytes(data[12:16], "little" if data[1] & 1 else "big")
-    return bytes(data[16 : 16 + max(size - 1, 0)]).decode(errors="replace")
 
 
 def _look_at_scan(scan: LaserScan, sensor: Sensor, returns: dict[str, Returns]) -> None:

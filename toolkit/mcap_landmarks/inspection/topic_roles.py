@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from mcap_landmarks import channels
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.inspection.cameras import ALL, NO_CAMERAS, Camera, Cameras, Named, cameras
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.points import PointCloud2
@@ -34,6 +35,7 @@ class Role:
         return tuple(message.ROS_TYPE for message in (*self.messages, *self.others))
 
 
+_OF_CAMERAS = (channels.CAMERA_IMAGE, channels.CAMERA_INFO)
 ROLES: Mapping[Channel[Message], Role] = {
     channels.CAMERA_IMAGE: Role("image", "--image", (CompressedImage, Image)),
     channels.CAMERA_INFO: Role("camera_info", "--remap", (CameraInfo,)),
@@ -46,10 +48,14 @@ ROLES: Mapping[Channel[Message], Role] = {
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """What the user said about topics: role name to topic, and FROM to TO of remapped topics."""
+    """What the user said about topics: role name to topic, FROM to TO of remapped ones, and images of several cameras.
+
+    `images` has two or more topics or the word `all`; it is empty where there is one camera.
+    """
 
     topics: Mapping[str, str] = field(default_factory=dict)
     remaps: Mapping[str, str] = field(default_factory=dict)
+    images: tuple[str, ...] = ()
 
 
 def parse_remaps(texts: Sequence[str]) -> dict[str, str]:
@@ -102,39 +108,60 @@ def choose(recording: Readable, channel: Channel[Message], choice: Choice) -> tu
     Raises:
         UsageError: the chosen topic is missing or of another type, or several topics fit and none was chosen.
     """
-    named = [
-        (choice.remaps.get(entry.connection.topic, entry.connection.topic), entry.connection)
-        for entry in recording.channels
-    ]
+    named = _named(recording, choice)
     role = ROLES.get(channel)
     if role is None:  # transforms that never change come on /tf as well, from ROS 1 and some drivers
         topics = {channel.topic, channels.TF.topic} if channel == channels.TF_STATIC else {channel.topic}
         return tuple(connection for topic, connection in named if topic in topics)
-    chosen = choice.topics.get(role.name)
-    if chosen is None:
+    if choice.images and channel in _OF_CAMERAS:
+        return _of_cameras(channel, cameras_of(recording, choice).used, named)
+    chosen = [choice.topics[role.name]] if role.name in choice.topics else []
+    if not chosen:
         fitting = topics_for(role, [(topic, connection.message_type) for topic, connection in named])
         chosen = _only(recording, channel, fitting, choice)
-    if chosen is None:
-        return ()
-    found = tuple(connection for topic, connection in named if topic == chosen)
-    _check_chosen(recording, role, chosen, found)
+    found = tuple(connection for topic, connection in named if topic in chosen)
+    if chosen:
+        _check_chosen(recording, role, chosen[0], found)
     return found
 
 
-def _only(recording: Readable, channel: Channel[Message], fitting: list[str], choice: Choice) -> str | None:
-    """The one topic that fits, None if none does.
+def cameras_of(recording: Readable, choice: Choice) -> Cameras:
+    """The cameras that the user chose, none where it is not several.
+
+    Raises:
+        UsageError: see `cameras`.
+    """
+    return cameras(recording, _named(recording, choice), choice.images) if choice.images else NO_CAMERAS
+
+
+def _named(recording: Readable, choice: Choice) -> list[tuple[str, Connection]]:
+    connections = [entry.connection for entry in recording.channels]
+    return [(choice.remaps.get(connection.topic, connection.topic), connection) for connection in connections]
+
+
+def _of_cameras(channel: Channel[Message], used: Sequence[Camera], named: Named) -> tuple[Connection, ...]:
+    topics = {one.image if channel == channels.CAMERA_IMAGE else one.info for one in used}
+    return tuple(connection for topic, connection in named if topic in topics)
+
+
+def _only(recording: Readable, channel: Channel[Message], fitting: list[str], choice: Choice) -> list[str]:
+    """The one topic that fits, none if none does; every CameraInfo where there is none or more than one camera's image.
 
     Raises:
         UsageError: several fit.
     """
+    role, images = ROLES[channel], []
     if channel == channels.CAMERA_INFO and len(fitting) > 1:
-        fitting = _of_the_image(recording, fitting, choice)
+        images = _images(recording, choice)
+        if len(images) != 1:  # boxes say by their frame whose they are
+            return fitting
+        fitting = _of_the_image(images[0], fitting)
     if len(fitting) > 1:
-        role = ROLES[channel]
         how = f"{role.option} TOPIC" if role.option != "--remap" else f"--remap TOPIC={channel.topic}"
         how += ", twice to merge two" if channel == channels.SCAN else ""
+        how += f", several times or --image {ALL} for several cameras" if channel == channels.CAMERA_IMAGE else ""
         raise UsageError(f"{recording.path}: {' and '.join(fitting)} could be the {role.name}; choose with {how}")
-    return fitting[0] if fitting else None
+    return fitting
 
 
 def _check_chosen(recording: Readable, role: Role, topic: str, found: Collection[Connection]) -> None:
@@ -150,12 +177,16 @@ def _check_chosen(recording: Readable, role: Role, topic: str, found: Collection
             )
 
 
-def _of_the_image(recording: Readable, infos: list[str], choice: Choice) -> list[str]:
+def _images(recording: Readable, choice: Choice) -> list[str]:
+    """The topics that could be the image, or the one that was chosen."""
+    role, named = ROLES[channels.CAMERA_IMAGE], _named(recording, choice)
+    chosen = choice.topics.get(role.name)
+    return [chosen] if chosen else topics_for(role, [(topic, entry.message_type) for topic, entry in named])
+
+
+def _of_the_image(image: str, infos: list[str]) -> list[str]:
     """The topics of CameraInfo that share most namespaces with the image; all where that does not tell them apart."""
-    images = choose(recording, channels.CAMERA_IMAGE, choice)
-    if not images:
-        return infos
-    shared = {topic: channels.shared_namespaces(images[0].topic, topic) for topic in infos}
+    shared = {topic: channels.shared_namespaces(image, topic) for topic in infos}
     return [topic for topic in infos if shared[topic] == max(shared.values())]
 
 

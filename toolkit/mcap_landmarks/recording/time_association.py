@@ -1,7 +1,7 @@
 """Time association: messages of several channels to bundles, in one pass over a recording and in bounded memory."""
 
 from collections import Counter, deque
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from mcap_landmarks.messages.codec import Message
@@ -16,6 +16,8 @@ WINDOW_NS = WIDEST_GAP_NS
 BESIDE_NS = 250_000_000
 """How far from a bundle's stamp a message may be that belongs beside it: half a period at 2 Hz, and who records
 fewer images has most bundles without one anyway."""
+
+_NONE: Mapping[Channel[Message], int] = {}
 
 
 @dataclass(slots=True)
@@ -41,16 +43,18 @@ def associate(
     with_odometry: bool = True,
     held: Collection[Channel[Message]] = (),
     beside: Collection[Channel[Message]] = (),
+    by_frame: Mapping[Channel[Message], int] = _NONE,
 ) -> Iterator[Bundle]:
     """One bundle per message of the channel `primary`, with odometry interpolated at its stamp if that is wanted.
 
     `messages` are (channel, log time, message) by log time; every `Odometry` among them is taken as the robot's.
     Stamps are the headers', log time where those are zero. Of a `held` channel a bundle gets the latest message so far,
     of transforms the latest of every frame. Of a channel `beside` it gets the message nearest to its stamp, within
-    `BESIDE_NS`, among those that are nearer to no other bundle. A bundle waits for what is still to come, at most
-    `WINDOW_NS` of log time; then it goes without. `counts` is kept up to date.
+    `BESIDE_NS`, among those that are nearer to no other bundle. Of the channels `by_frame` it gets one such message of
+    each frame; there will be as many frames as the number says, or more. A bundle waits for what is still to come, at
+    most `WINDOW_NS` of log time; then it goes without. `counts` is kept up to date.
     """
-    table = _Table(primary, counts, with_odometry, held, beside)
+    table = _Table(primary, counts, with_odometry, (held, beside), by_frame)
     for channel, log_time_ns, message in messages:
         table.take(channel, log_time_ns, message)
         yield from table.ready(log_time_ns)
@@ -65,13 +69,13 @@ class _Table:
         primary: Channel[Message],
         counts: Association,
         with_odometry: bool,
-        held: Collection[Channel[Message]],
-        beside: Collection[Channel[Message]],
+        others: tuple[Collection[Channel[Message]], Collection[Channel[Message]]],
+        by_frame: Mapping[Channel[Message], int],
     ) -> None:
-        self._primary, self._counts = primary, counts
+        self._primary, self._counts, self._by_frame = primary, counts, by_frame
         self._odometry = OdometryBuffer() if with_odometry else None
-        self._held = {channel: _Held() for channel in held}
-        self._beside = {channel: _Beside() for channel in beside}
+        self._held: dict[Channel[Message], dict[str, _Held]] = {channel: {} for channel in others[0]}
+        self._beside: dict[Channel[Message], dict[str, _Beside]] = {channel: {} for channel in others[1]}
         self._waiting: deque[Bundle] = deque()
         self._stamps: deque[int] = deque()  # of the bundles of the last moments, those that went included
 
@@ -81,13 +85,18 @@ class _Table:
             self._waiting.append(Bundle(stamp_ns, log_time_ns, {channel: message}))
             self._stamps.append(stamp_ns)
         elif channel in self._held:
-            self._held[channel].take(message)
+            self._held[channel].setdefault(self._frame(channel, message), _Held()).take(message)
         elif channel in self._beside:
-            self._beside[channel].messages.append((stamp_ns, message))
+            partners = self._beside[channel].setdefault(self._frame(channel, message), _Beside())
+            partners.messages.append((stamp_ns, message))
         elif self._odometry is not None and isinstance(message, Odometry):
             self._odometry.add(stamp_ns, message)
             self._counts.odometry_out_of_order = self._odometry.out_of_order
             self._counts.odometry_not_finite = self._odometry.not_finite
+
+    def _frame(self, channel: Channel[Message], message: Message) -> str:
+        """The frame of a message whose channel has one for each, else none."""
+        return getattr(message, "frame_id", "") if channel in self._by_frame else ""
 
     def ready(self, log_time_ns: int | None) -> Iterator[Bundle]:
         """The bundles that have nothing more to wait for at a log time; at the end, None, that is all."""
@@ -98,18 +107,21 @@ class _Table:
                 return
             yield self._finish(self._waiting.popleft())
         if log_time_ns is None:
-            for channel, partners in self._beside.items():
-                self._counts.unpaired[channel.topic] += len(partners.messages)
+            for channel, frames in self._beside.items():
+                self._counts.unpaired[channel.topic] += sum(len(partners.messages) for partners in frames.values())
 
     def _is_complete(self, bundle: Bundle) -> bool:
         stamp_ns = bundle.stamp_ns
         if self._odometry is not None and self._odometry.latest_ns < stamp_ns + self._duration_ns(bundle):
             return False
-        if any(held.latest is None for held in self._held.values()):
+        frames_of = {channel: len(self._latest(channel)) for channel in self._held}
+        frames_of |= {channel: len(frames) for channel, frames in self._beside.items()}
+        if any(count < self._by_frame.get(channel, 1) for channel, count in frames_of.items()):
             return False
         # A later bundle may be nearer to a message that is near to this one.
         rivals_known = not self._beside or self._stamps[-1] > stamp_ns + 2 * BESIDE_NS
-        return rivals_known and all(partners.passed(stamp_ns) for partners in self._beside.values())
+        partners = [one for frames in self._beside.values() for one in frames.values()]
+        return rivals_known and all(one.passed(stamp_ns) for one in partners)
 
     def _duration_ns(self, bundle: Bundle) -> int:
         return getattr(bundle.messages[self._primary], "duration_ns", 0)
@@ -124,17 +136,28 @@ class _Table:
             duration_ns = self._duration_ns(bundle)
             if odometry is not None and duration_ns:
                 odometry = replace(odometry, samples=self._odometry.around(bundle.stamp_ns, duration_ns))
-        found.update({channel: held.latest for channel, held in self._held.items() if held.latest is not None})
-        for channel, partners in self._beside.items():
-            partner = partners.pick(bundle.stamp_ns, self._stamps)
-            counts.unpaired[channel.topic] += partners.forget(bundle.stamp_ns - BESIDE_NS)
-            if partner is None:
-                counts.alone[channel.topic] += 1
-            else:
-                found[channel] = partner
+        several = {channel: self._latest(channel) for channel in self._held}
+        several |= {channel: self._partners(channel, bundle.stamp_ns) for channel in self._beside}
+        counts.alone.update(channel.topic for channel in self._beside if not several[channel])
+        found.update({channel: messages[0] for channel, messages in several.items() if messages})
         while self._stamps[0] < bundle.stamp_ns - 2 * BESIDE_NS:
             self._stamps.popleft()
-        return Bundle(bundle.stamp_ns, bundle.log_time_ns, found, odometry)
+        more = {channel: tuple(messages) for channel, messages in several.items() if len(messages) > 1}
+        return Bundle(bundle.stamp_ns, bundle.log_time_ns, found, odometry, more)
+
+    def _latest(self, channel: Channel[Message]) -> list[Message]:
+        """The latest message of a held channel, of each frame where it has several."""
+        return [held.latest for _, held in sorted(self._held[channel].items()) if held.latest is not None]
+
+    def _partners(self, channel: Channel[Message], stamp_ns: int) -> list[Message]:
+        """The messages of a channel that belong beside a bundle, one of each frame that has any."""
+        found = []
+        for _, partners in sorted(self._beside[channel].items()):
+            partner = partners.pick(stamp_ns, self._stamps)
+            self._counts.unpaired[channel.topic] += partners.forget(stamp_ns - BESIDE_NS)
+            if partner is not None:
+                found.append(partner)
+        return found
 
 
 class _Held:

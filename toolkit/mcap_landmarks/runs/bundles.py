@@ -2,13 +2,15 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
-from mcap_landmarks.channels import CAMERA_INFO, ODOMETRY, TF_STATIC
+from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, ODOMETRY, TF_STATIC
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.inspection.topic_roles import ROLES, Choice, choose, could_be, message_type
 from mcap_landmarks.maps.scene_objects import usable
 from mcap_landmarks.messages.codec import Message, decode
+from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage
 from mcap_landmarks.recording.odometry_buffer import odometry_from
@@ -17,6 +19,12 @@ from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage, Readab
 
 HELD = (CAMERA_INFO, TF_STATIC)
 """Channels of which a bundle gets the latest message so far, however old."""
+_OF_CAMERAS = (CAMERA_INFO, DETECTIONS)
+"""Channels of which a bundle gets a message for every camera."""
+
+
+Frames = Mapping[Connection, str]
+"""The frames of several cameras, by the connections of their images and CameraInfos."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,11 +119,13 @@ def read_bundles(
     inputs: Mapping[Connection, Channel[Message]],
     reads: Sequence[Channel[Message]],
     reading: Reading,
+    frames: Frames = MappingProxyType({}),
 ) -> Iterator[Bundle]:
     """The bundles of messages by log time, one per message of the first channel of `reads`.
 
     They wait for odometry if `reads` has it, for transforms and camera information if the recording has any, and get
-    of every other channel of `reads` the message nearest in time. `reading` is kept up to date.
+    of every other channel of `reads` the message nearest in time, of detections that of every camera. `reading` is kept
+    up to date; `frames` are those of several cameras, see `decoded`.
 
     A message that cannot be decoded is a loss, an unusable object is dropped; both are counted.
     """
@@ -123,13 +133,19 @@ def read_bundles(
     present = {*inputs.values()} | {TF_STATIC for entry in inputs if entry.message_type == TFMessage.ROS_TYPE}
     others = [channel for channel in reads[1:] if channel != ODOMETRY and channel in present]
     return associate(
-        decoded(raws, inputs, reading),
+        decoded(raws, inputs, reading, frames),
         reads[0],
         reading.association,
         with_odometry=ODOMETRY in reads,
         held=[channel for channel in others if channel in HELD],
         beside=[channel for channel in others if channel not in HELD],
+        by_frame={channel: _frame_count(channel, inputs, frames) for channel in _OF_CAMERAS},
     )
+
+
+def _frame_count(channel: Channel[Message], inputs: Mapping[Connection, Channel[Message]], frames: Frames) -> int:
+    """How many frames there will be of a channel, as far as that is known: one, else those of its connections."""
+    return len({frames.get(connection, "") for connection, known in inputs.items() if known == channel}) or 1
 
 
 def held_before(
@@ -142,9 +158,15 @@ def held_before(
 
 
 def decoded(
-    raws: Iterable[RawMessage], inputs: Mapping[Connection, Channel[Message]], reading: Reading
+    raws: Iterable[RawMessage],
+    inputs: Mapping[Connection, Channel[Message]],
+    reading: Reading,
+    frames: Frames = MappingProxyType({}),
 ) -> Iterator[tuple[Channel[Message], int, Message]]:
-    """The messages of inputs with their channels and log times; odometry also as such, whatever message carries it."""
+    """The messages of inputs with their channels and log times; odometry also as such, whatever message carries it.
+
+    Messages of connections in `frames` get that frame: drivers often give images another one than their CameraInfo.
+    """
     for raw in raws:
         channel = inputs.get(raw.connection)
         if channel is None:
@@ -154,6 +176,8 @@ def decoded(
         except MessageError as error:
             reading.lose(raw.connection.topic, raw.log_time_ns, str(error))
             continue
+        if raw.connection in frames and isinstance(message, CameraInfo | CompressedImage | Image):
+            message = replace(message, frame_id=frames[raw.connection])
         if isinstance(message, SceneObjects):
             message = usable(message, reading.dropped)
         if isinstance(message, TFMessage):  # one message may hold odometry and where a sensor is

@@ -121,4 +121,5 @@ def choice_options(choice: Choice, reads: Sequence[Channel[Message]]) -> dict[st
     roles = {role.name for channel, role in ROLES.items() if channel in reads}
     given = {entry.name: getattr(choice, entry.name) for entry in fields(choice)}
     given["topics"] = {role: topic for role, topic in choice.topics.items() if role in roles}
+    given["images"] = list(choice.images) if roles & {"image", "camera_info"} else []
     return {name: value for name, value in given.items() if value}

@@ -1,11 +1,14 @@
 """A log as one stage reads it: which connections, and the bundles of their messages in one pass."""
 
+import copy
 from collections.abc import Iterator
 from itertools import chain
+from typing import Self
 
-from mcap_landmarks.channels import ODOMETRY
+from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.inspection.topic_roles import choose
+from mcap_landmarks.inspection.cameras import NO_CAMERAS, Cameras, info_frames
+from mcap_landmarks.inspection.topic_roles import cameras_of, choose
 from mcap_landmarks.messages.codec import M
 from mcap_landmarks.recording.layered_log import LayeredLog
 from mcap_landmarks.runs.bundles import Reading, Span, decoded, held_before, inputs_of, read_bundles
@@ -30,6 +33,8 @@ class StageInput:
         self._inputs = inputs_of(log, stage.reads, stage.required, span.choice)
         self._primaries = [entry for entry, channel in self._inputs.items() if channel == stage.reads[0]]
         self.primary = self._primaries[0]
+        cameras = cameras_of(log, span.choice) if {CAMERA_IMAGE, CAMERA_INFO} & {*self._inputs.values()} else NO_CAMERAS
+        self.notes, self._frames = cameras.notes(), self._frames_of(cameras)
 
     @property
     def count(self) -> int:
@@ -49,11 +54,27 @@ class StageInput:
             UsageError: messages are to be left out by motion, and there is no odometry.
         """
         raws = chain(held_before(self._log, self._inputs, self._span.start_ns), self._raws(progress, thinning))
-        return read_bundles(raws, self._inputs, self._reads, self.reading)
+        return read_bundles(raws, self._inputs, self._reads, self.reading, self._frames)
+
+    def by_frame(self) -> dict[str, Self]:
+        """The same log for each of several cameras, whose images are primary there, by frame; none for one camera."""
+        found = {}
+        for connection in self._primaries:
+            if connection in self._frames:
+                found[self._frames[connection]] = one = copy.copy(self)
+                one.primary = connection
+        return found
 
     def close(self) -> None:
         """Sum up what became of the messages, when all of them were read."""
         self.reading.close(self._log.losses)
+
+    def _frames_of(self, used: Cameras) -> dict[Connection, str]:
+        """The frames of several cameras, by connection; where none were chosen, as their CameraInfos tell them."""
+        infos = [entry for entry, channel in self._inputs.items() if channel == CAMERA_INFO]
+        frames, remaps = used.frames(), self._span.choice.remaps
+        told = {entry: frames.get(remaps.get(entry.topic, entry.topic)) for entry in self._inputs}
+        return {entry: frame for entry, frame in told.items() if frame is not None} or info_frames(self._log, infos)
 
     def _raws(self, progress: Progress, thinning: Thinning) -> Iterator[RawMessage]:
         odometry = choose(self._log, ODOMETRY, self._span.choice) if thinning.by_motion else ()

@@ -30,11 +30,13 @@ def run_stage(step: Step, log: StageInput, thinning: Thinning, target: Path, pro
         for result in naming(log.path, stage.process(bundles, step.config, step.files)):
             if isinstance(result, Omission):
                 _omit(result, log)
-            elif result.channel in writes:
+                continue
+            channel = writes.get((result.channel, result.frame_id)) or writes.get((result.channel, ""))
+            if channel is not None:
                 counts.update(tally(result.message))
-                writer.add(Stamped(writes[result.channel], result.log_time_ns, result.message), stage.name)
+                writer.add(Stamped(channel, result.log_time_ns, result.message), stage.name)
         log.close()
-        record = step.record.with_outcome(outcome_of(log.reading, counts, notes))
+        record = step.record.with_outcome(outcome_of(log.reading, counts, (*log.notes, *notes)))
         writer.metadata[RUN] = Manifest("part", fingerprint=record.key, stages=(record,)).entries()
     return record
 
@@ -61,15 +63,25 @@ def _omit(omission: Omission, log: StageInput) -> None:
         log.reading.dropped[omission.reason] += 1
 
 
-def _writes(
-    stage: Stage, log: StageInput, config: Config
-) -> tuple[dict[Channel[Message], Channel[Message]], tuple[str, ...]]:
-    """The stage's channels and those that they become in this log, and why others are left out."""
-    writes, notes = dict[Channel[Message], Channel[Message]](), list[str]()
+Places = dict[tuple[Channel[Message], str], Channel[Message]]
+
+
+def _writes(stage: Stage, log: StageInput, config: Config) -> tuple[Places, tuple[str, ...]]:
+    """The channels that the stage's channels become in this log, and why others are left out.
+
+    Each is told with the frame that its messages are of, none where that does not matter.
+    """
+    writes, notes = Places(), dict[str, None]()
     for channel in stage.writes:
-        topic = stage.places[channel](log, config) if channel in stage.places else channel.topic
-        if isinstance(topic, LeftOut):
-            notes.append(topic.reason)
-        else:
-            writes[channel] = Channel(topic, channel.message)
+        views = log.by_frame() if channel in stage.places else {}
+        taken = set[str]()
+        for frame, view in (views or {"": log}).items():
+            topic = stage.places[channel](view, config) if channel in stage.places else channel.topic
+            if isinstance(topic, LeftOut):
+                notes[topic.reason] = None
+                continue
+            if topic in taken:  # of several cameras, whose topics do not lie apart
+                topic = f"{view.primary.topic}/{topic.rpartition('/')[2]}"
+            taken.add(topic)
+            writes[channel, frame] = Channel(topic, channel.message)
     return writes, tuple(notes)

@@ -76,30 +76,30 @@ def thin(
     """The messages without the images that nobody wants, which are counted in `dropped`; nothing else is left out.
 
     The rate is kept on the mean, by log time, and jitter costs no images. Motion is that of the latest odometry before
-    an image; as long as there is none, every image is taken.
+    an image; as long as there is none, every image is taken. Each of several topics of images is thinned by itself.
     """
-    rate = _Rate(thinning.rate_hz) if thinning.rate_hz else None
+    rates = {entry.topic: _Rate(thinning.rate_hz) for entry in images} if thinning.rate_hz else {}
     motion = _Motion(thinning) if thinning.by_motion else None
     for raw in raws:
         if motion and raw.connection in odometry:
             motion.follow(raw)
-        reason = _take(raw.log_time_ns, rate, motion) if raw.connection in images else None
+        reason = _take(raw, rates.get(raw.connection.topic), motion) if raw.connection in images else None
         if reason is None:
             yield raw
         else:
             dropped[reason] += 1
 
 
-def _take(time_ns: int, rate: "_Rate | None", motion: "_Motion | None") -> str | None:
+def _take(raw: RawMessage, rate: "_Rate | None", motion: "_Motion | None") -> str | None:
     """Take an image, or say why not."""
-    if rate and not rate.is_due(time_ns):
+    if rate and not rate.is_due(raw.log_time_ns):
         return TOO_FAST
-    if motion and not motion.has_come_far():
+    if motion and not motion.has_come_far(raw.connection.topic):
         return TOO_NEAR
     if rate:
-        rate.take(time_ns)
+        rate.take(raw.log_time_ns)
     if motion:
-        motion.take()
+        motion.take(raw.connection.topic)
     return None
 
 
@@ -124,12 +124,12 @@ class _Rate:
 
 
 class _Motion:
-    """How far the robot has come since the last image that was taken."""
+    """How far the robot has come since the last image of a topic that was taken."""
 
     def __init__(self, thinning: Thinning) -> None:
         self._thinning = thinning
         self._now: Array | None = None
-        self._taken: Array | None = None
+        self._taken: dict[str, Array | None] = {}
 
     def follow(self, raw: RawMessage) -> None:
         try:
@@ -139,12 +139,13 @@ class _Motion:
         if found is not None and np.isfinite(found.pose).all():
             self._now = found.pose
 
-    def has_come_far(self) -> bool:
-        if self._now is None or self._taken is None:
+    def has_come_far(self, topic: str) -> bool:
+        taken = self._taken.get(topic)
+        if self._now is None or taken is None:
             return True
-        forward, left, turn = between(self._taken, self._now).tolist()
+        forward, left, turn = between(taken, self._now).tolist()
         far = self._thinning.every_m is not None and math.hypot(forward, left) >= self._thinning.every_m
         return far or (self._thinning.every_rad is not None and abs(turn) >= self._thinning.every_rad)
 
-    def take(self) -> None:
-        self._taken = self._now
+    def take(self, topic: str) -> None:
+        self._taken[topic] = self._now

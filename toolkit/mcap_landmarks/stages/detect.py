@@ -108,7 +108,7 @@ def _messages(bundle: Bundle, found: Found, verdicts: Sequence[Verdict]) -> Iter
     options = tuple(hypotheses for _, hypotheses in kept)
     detections = Detections(image.stamp_ns, image.frame_id, ("",) * len(kept), options, boxes)
     yield Stamped(DETECTIONS, bundle.log_time_ns, detections)
-    yield Stamped(ANNOTATIONS, bundle.log_time_ns, annotations(detections))
+    yield Stamped(ANNOTATIONS, bundle.log_time_ns, annotations(detections), image.frame_id)
     for verdict in verdicts:
         if verdict.hypotheses is None:
             yield Omission(bundle.log_time_ns, verdict.reason)

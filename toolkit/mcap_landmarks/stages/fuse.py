@@ -1,7 +1,7 @@
 """Fuse detections in images with objects in scans to scene objects, which have a class and a place."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,8 +17,8 @@ from mcap_landmarks.channels import (
     SCENE_VELOCITIES,
     TF_STATIC,
 )
-from mcap_landmarks.errors import RecordingError
-from mcap_landmarks.fusion.camera_view import CameraView
+from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.fusion.camera_view import CameraView, SeenImage
 from mcap_landmarks.fusion.cloud_fuser import CloudFuser
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.fuser import Fuser
@@ -27,6 +27,7 @@ from mcap_landmarks.fusion.scene_markers import markers_from_scene
 from mcap_landmarks.fusion.selection import at_least, usable, wanted
 from mcap_landmarks.fusion.thesis import fuse_in_order
 from mcap_landmarks.geometry.camera import CameraModel
+from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo
@@ -55,9 +56,13 @@ def process(
         found = bundle.get(SCAN_OBJECTS)
         if found is None:
             continue
-        objects, given = usable(found), bundle.get(DETECTIONS)
-        scans, images = scans + 1, images + (given is not None)
-        detections, left_out = (None, Counter[str]()) if given is None else wanted(given, config)
+        objects, given = usable(found), bundle.each(DETECTIONS)
+        scans, images = scans + 1, images + len(given)
+        detections, left_out = list[Detections](), Counter[str]()
+        for one in given:
+            kept, reasons = wanted(one, config)
+            detections.append(kept)
+            left_out += reasons
         scene, unexplained = _fused(bundle, objects, detections, fusers, mounting)
         scene, too_few = at_least(scene, config.min_objects)
         yield Stamped(SCENE_OBJECTS, bundle.log_time_ns, scene)
@@ -85,32 +90,47 @@ class _Fusers:
 
 
 def _fused(
-    bundle: Bundle, objects: ScanObjects, detections: Detections | None, fusers: _Fusers, mounting: Mounting
+    bundle: Bundle, objects: ScanObjects, detections: Sequence[Detections], fusers: _Fusers, mounting: Mounting
 ) -> tuple[SceneObjects, int]:
     """The scene of a bundle, and the number of its boxes that come to nothing."""
     config, cloud = fusers.config, bundle.get(CLUSTERED_CLOUD)
     if config.method == "thesis":
-        return fuse_in_order(objects, detections, config.image_centre_px)
-    view = None if detections is None else _view(bundle, detections, objects, mounting, config)
+        if len(detections) > 1:
+            raise UsageError("the thesis's method has one camera; choose it with --image TOPIC")
+        return fuse_in_order(objects, next(iter(detections), None), config.image_centre_px)
+    images = [SeenImage(one, _view(bundle, one, objects, mounting, config)) for one in detections]
     odometry = None if bundle.odometry is None else bundle.odometry.odom_from_base
     if cloud is not None and cloud.stamp_ns == objects.stamp_ns:
-        return fusers.clouds.add(cloud, detections, view, odometry)
-    return fusers.planar.add(objects, detections, view, odometry)
+        return fusers.clouds.add(cloud, images, odometry)
+    return fusers.planar.add(objects, images, odometry)
 
 
 def _view(
     bundle: Bundle, detections: Detections, objects: ScanObjects, mounting: Mounting, config: FuseConfig
 ) -> CameraView:
-    info = bundle.get(CAMERA_INFO)
-    if info is None:
-        raise RecordingError(
-            f"there is no {CameraInfo.ROS_TYPE} for the camera of {DETECTIONS.topic}; record the camera's, or read "
-            f"another topic as it with --remap TOPIC={CAMERA_INFO.topic}"
-        )
+    info = _info(bundle, detections.frame_id)
     base_from_camera = mounting.lookup(bundle, objects.frame_id, info.frame_id or detections.frame_id)
     velocity = np.zeros(3) if bundle.odometry is None else bundle.odometry.velocity
     late_s = ((detections.stamp_ns or bundle.stamp_ns) - bundle.stamp_ns) / 1e9
     return CameraView.at(_camera(info, config), base_from_camera, velocity, late_s)
+
+
+def _info(bundle: Bundle, frame_id: str) -> CameraInfo:
+    """The CameraInfo of the camera of a frame: the only one, else that of the frame."""
+    infos = bundle.each(CAMERA_INFO)
+    if not infos:
+        raise RecordingError(
+            f"there is no {CameraInfo.ROS_TYPE} for the camera of {DETECTIONS.topic}; record the camera's, or read "
+            f"another topic as it with --remap TOPIC={CAMERA_INFO.topic}"
+        )
+    own = [info for info in infos if plain(info.frame_id) == plain(frame_id)]
+    if len(infos) > 1 and not own:
+        frames = ", ".join(info.frame_id for info in infos)
+        raise RecordingError(
+            f"no {CameraInfo.ROS_TYPE} is of the frame {frame_id!r}, which boxes on {DETECTIONS.topic} are of, but of "
+            f"{frames}; choose the images that they are of with --image TOPIC"
+        )
+    return (own or infos)[0]
 
 
 def _camera(info: CameraInfo, config: FuseConfig) -> CameraModel:
