@@ -2,6 +2,8 @@
 
 import math
 from collections import Counter
+from functools import reduce
+from operator import or_
 from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
@@ -85,12 +87,13 @@ def _print(situation: "Situation", places: "tuple[Place, ...]") -> None:
 
 
 def _detected(situation: "Situation") -> str:
-    found = situation.detections
-    if found is None:
-        return "nothing that the log tells"
-    names = ", ".join(f"{name} {score:.2f}" for options in found.hypotheses for name, score in options[:1])
-    apart_ms = (found.stamp_ns - situation.stamp_ns) / 1e6
-    return f"{names or 'no object'}, in the image {apart_ms:+.0f} ms beside the scan"
+    told = []
+    for found in situation.detections:
+        names = ", ".join(f"{name} {score:.2f}" for options in found.hypotheses for name, score in options[:1])
+        apart_ms = (found.stamp_ns - situation.stamp_ns) / 1e6
+        image = f"image of {found.frame_id}" if len(situation.detections) > 1 else "image"
+        told.append(f"{names or 'no object'}, in the {image} {apart_ms:+.0f} ms beside the scan")
+    return "; ".join(told) or "nothing that the log tells"
 
 
 def _clustered(situation: "Situation") -> str:
@@ -106,9 +109,10 @@ def _fused(situation: "Situation") -> str:
     if scene is None:
         return "no scene objects at this time"
     text = f"{len(scene)} objects"
-    if situation.detections is not None:
-        seen = Counter(options[0][0] for options in situation.detections.hypotheses if options)
-        left = seen - Counter(scene.classes)
+    if situation.detections:
+        seen = [Counter(options[0][0] for options in one.hypotheses if options) for one in situation.detections]
+        # What two cameras see may be the same.
+        left = reduce(or_, seen) - Counter(scene.classes)
         if left:
             text += f"; detected, but no object: {', '.join(f'{count} {name}' for name, count in sorted(left.items()))}"
     if situation.landmarks is not None:
@@ -217,12 +221,14 @@ def _pose(place: "Place") -> tuple[float, float, float]:
 
 
 def _document(situation: "Situation", places: "tuple[Place, ...]") -> dict[str, object]:
-    match, found = situation.match, situation.detections
+    match = situation.match
     return {
         "stamp_ns": situation.stamp_ns,
         "status": None if match is None else match.status.name.lower(),
         "bundles_joined": None if match is None else match.bundles_joined,
-        "detections": None if found is None else _detections(found),
+        "detections": [entry for found in situation.detections for entry in _detections(found)]
+        if situation.detections
+        else None,
         "clusters": None if situation.scan_objects is None else len(situation.scan_objects),
         "objects": None if situation.scene is None else _objects(situation, places),
         "places": [
@@ -242,7 +248,7 @@ def _document(situation: "Situation", places: "tuple[Place, ...]") -> dict[str, 
 
 def _detections(found: "Detections") -> list[dict[str, object]]:
     return [
-        {"class": hypotheses[0][0], "confidence": hypotheses[0][1], "xyxy": box}
+        {"class": hypotheses[0][0], "confidence": hypotheses[0][1], "xyxy": box, "camera": found.frame_id}
         for hypotheses, box in zip(found.hypotheses, found.boxes_xyxy.tolist(), strict=True)
         if hypotheses
     ]

@@ -27,7 +27,7 @@ class Situation:
     """What a log holds about one bundle; None where it has nothing of that kind.
 
     `landmarks` is the map that was used; `pose` (3,) and `covariance` (3, 3) are what was published, where there is no
-    heading without a covariance. `config` is what localize ran with.
+    heading without a covariance. `detections` are those of every camera. `config` is what localize ran with.
     """
 
     stamp_ns: int
@@ -37,7 +37,7 @@ class Situation:
     pose: Array | None = None
     covariance: Array | None = None
     scan_objects: ScanObjects | None = None
-    detections: Detections | None = None
+    detections: tuple[Detections, ...] = ()
     config: LocalizeConfig = field(default_factory=LocalizeConfig)
 
 

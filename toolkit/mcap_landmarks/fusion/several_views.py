@@ -35,6 +35,10 @@ class ViewedObject(NamedTuple):
         return bool(self.look.boxes.cut[self.found.box, [0, 2]].any())
 
 
+_Views = dict[int, ViewedObject]
+"""What views show of one object, by their numbers."""
+
+
 def objects_in(cloud: ClusteredCloud, image: SeenImage, config: FuseConfig) -> list[ViewedObject]:
     """The objects that one image and a cloud show, in the order of their boxes."""
     things = seen_things(image.detections)
@@ -50,17 +54,24 @@ def distinct(views: Sequence[Sequence[ViewedObject]]) -> list[list[ViewedObject]
     Of those of one view that stand in each other only the surest is left; of several views each has its own.
     """
     everything = [(i, one) for i, view in enumerate(views) for one in view]
-    kept: list[dict[int, ViewedObject]] = []
+    kept: list[_Views] = []
     for i, one in sorted(everything, key=lambda entry: (len(entry[1].found.points) == 0, -entry[1].found.score)):
         if any(i in other and _stand_in_each_other(one, other[i]) for other in kept):
             continue
-        same = [other for other in kept if i not in other and any(_are_one(one, seen) for seen in other.values())]
+        same = [other for other in kept if i not in other and _is_of(one, other)]
         if same:
             min(same, key=lambda other: _apart_m(one, other))[i] = one
         else:
             kept.append({i: one})
-    ordered = sorted(kept, key=lambda seen: min((i, one.found.box) for i, one in seen.items()))
-    return [sorted(seen.values(), key=_how_well) for seen in ordered]
+    return [sorted(seen.values(), key=_how_well) for seen in sorted(kept, key=_first_box)]
+
+
+def _first_box(seen: _Views) -> tuple[int, int]:
+    return min((i, one.found.box) for i, one in seen.items())
+
+
+def _is_of(one: ViewedObject, seen: _Views) -> bool:
+    return any(_are_one(one, other) for other in seen.values())
 
 
 def _how_well(one: ViewedObject) -> tuple[bool, bool, float]:
@@ -89,5 +100,5 @@ def _is_in(one: Rectangle, other: Rectangle) -> bool:
     return bool(other.holds(one.centre_xy[None], 0.0)[0])
 
 
-def _apart_m(one: ViewedObject, others: dict[int, ViewedObject]) -> float:
+def _apart_m(one: ViewedObject, others: _Views) -> float:
     return min(float(np.hypot(*(one.found.place.centre_xy - other.found.place.centre_xy))) for other in others.values())

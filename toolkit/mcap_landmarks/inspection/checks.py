@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.channels import RESULTS
 from mcap_landmarks.geometry.frames import REMEDY
+from mcap_landmarks.inspection.cameras import ALL, info_topic
 from mcap_landmarks.inspection.survey import Returns, Sensor, Survey, connected
 from mcap_landmarks.recording.time_association import BESIDE_NS, WINDOW_NS
 
@@ -234,11 +235,18 @@ def _odometry(found: Survey) -> Iterator[Finding]:
 
 
 def _cameras(found: Survey) -> Iterator[Finding]:
-    infos = found.of("camera_info")
-    for sensor in found.of("image"):
-        if not infos:
-            text = "no camera_info goes with these images: they cannot be fused with scans"
-            yield Finding("problem", "camera", sensor.topic, text, "record the camera's camera_info topic too")
+    infos, images = {info.topic: info.frame for info in found.of("camera_info")}, found.of("image")
+    lone = [sensor.topic for sensor in images if info_topic(sensor.topic, sensor.frame, infos) is None]
+    for topic in lone if len(images) > 1 or not infos else []:
+        text = "no camera_info goes with these images: they cannot be fused with scans"
+        level = "warning" if infos else "problem"
+        yield Finding(level, "camera", topic, text, "record the camera's camera_info topic too")
+    if len(images) > 1:
+        text = f"images are on {len(images)} topics: {', '.join(sensor.topic for sensor in images)}"
+        remedy = (
+            f"choose with --image TOPIC, several times for several cameras, or --image {ALL} for all with camera_info"
+        )
+        yield Finding("warning", "camera", "", text, remedy)
     for topic in sorted(found.uncalibrated):
         text = "the camera is not calibrated: its focal length is zero"
         yield Finding("problem", "camera", topic, text, "calibrate it, and set its camera_info in the driver")

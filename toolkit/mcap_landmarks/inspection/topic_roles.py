@@ -115,14 +115,20 @@ def choose(recording: Readable, channel: Channel[Message], choice: Choice) -> tu
         return tuple(connection for topic, connection in named if topic in topics)
     if choice.images and channel in _OF_CAMERAS:
         return _of_cameras(channel, cameras_of(recording, choice).used, named)
-    chosen = [choice.topics[role.name]] if role.name in choice.topics else []
-    if not chosen:
-        fitting = topics_for(role, [(topic, connection.message_type) for topic, connection in named])
-        chosen = _only(recording, channel, fitting, choice)
+    chosen = _chosen(recording, channel, named, choice)
     found = tuple(connection for topic, connection in named if topic in chosen)
     if chosen:
         _check_chosen(recording, role, chosen[0], found)
     return found
+
+
+def _chosen(recording: Readable, channel: Channel[Message], named: Named, choice: Choice) -> list[str]:
+    """The topics of a role: the one that the user chose, else what fits."""
+    role = ROLES[channel]
+    if role.name in choice.topics:
+        return [choice.topics[role.name]]
+    fitting = topics_for(role, [(topic, connection.message_type) for topic, connection in named])
+    return _only(recording, channel, fitting, choice)
 
 
 def cameras_of(recording: Readable, choice: Choice) -> Cameras:

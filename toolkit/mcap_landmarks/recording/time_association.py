@@ -127,7 +127,7 @@ class _Table:
         return getattr(bundle.messages[self._primary], "duration_ns", 0)
 
     def _finish(self, bundle: Bundle) -> Bundle:
-        counts, found = self._counts, dict(bundle.messages)
+        counts = self._counts
         counts.bundles += 1
         odometry = None
         if self._odometry is not None:
@@ -136,14 +136,19 @@ class _Table:
             duration_ns = self._duration_ns(bundle)
             if odometry is not None and duration_ns:
                 odometry = replace(odometry, samples=self._odometry.around(bundle.stamp_ns, duration_ns))
-        several = {channel: self._latest(channel) for channel in self._held}
-        several |= {channel: self._partners(channel, bundle.stamp_ns) for channel in self._beside}
-        counts.alone.update(channel.topic for channel in self._beside if not several[channel])
-        found.update({channel: messages[0] for channel, messages in several.items() if messages})
+        found = self._others(bundle.stamp_ns)
+        firsts = {channel: messages[0] for channel, messages in found.items()}
+        several = {channel: messages for channel, messages in found.items() if len(messages) > 1}
         while self._stamps[0] < bundle.stamp_ns - 2 * BESIDE_NS:
             self._stamps.popleft()
-        more = {channel: tuple(messages) for channel, messages in several.items() if len(messages) > 1}
-        return Bundle(bundle.stamp_ns, bundle.log_time_ns, found, odometry, more)
+        return Bundle(bundle.stamp_ns, bundle.log_time_ns, {**bundle.messages, **firsts}, odometry, several)
+
+    def _others(self, stamp_ns: int) -> dict[Channel[Message], tuple[Message, ...]]:
+        """The messages of all channels but the primary one that go with a bundle's stamp; no channel without any."""
+        found = {channel: self._latest(channel) for channel in self._held}
+        found |= {channel: self._partners(channel, stamp_ns) for channel in self._beside}
+        self._counts.alone.update(channel.topic for channel in self._beside if not found[channel])
+        return {channel: tuple(messages) for channel, messages in found.items() if messages}
 
     def _latest(self, channel: Channel[Message]) -> list[Message]:
         """The latest message of a held channel, of each frame where it has several."""

@@ -4,11 +4,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
 from mcap_landmarks.evaluation.explain import Place, Situation
 from mcap_landmarks.geometry.se2 import Array, transform_points
-from mcap_landmarks.report.explain_reading import SensorData
+from mcap_landmarks.report.explain_reading import Picture, SensorData
 
 _GREY, _OBJECT, _CLUSTER, _BOX = "#9CA3AF", "#D55E00", "#0072B2", "#FACC15"
 _PLACES = ("#111827", "#7E22CE", "#047857", "#B45309", "#1D4ED8")
@@ -19,11 +18,11 @@ _AROUND_M = 6.0
 def explanation_figure(situation: Situation, places: tuple[Place, ...], view: SensorData, title: str = "") -> Figure:
     """As many panels as there is something to show: at least the objects around the robot."""
     maps = situation.landmarks is not None and any(place.pose is not None for place in places)
-    count = 1 + (view.image is not None) + maps
+    count = 1 + len(view.pictures) + maps
     result = Figure(figsize=(5.6 * count, 5.4), layout="constrained")
     panels = iter(result.subplots(1, count, squeeze=False)[0])
-    if view.image is not None:
-        _draw_image(next(panels), situation, view.image)
+    for picture in view.pictures:
+        _draw_image(next(panels), situation, picture, "image" if len(view.pictures) == 1 else "")
     _draw_objects(next(panels), situation, view)
     if maps:
         _draw_map(next(panels), situation, places)
@@ -32,15 +31,16 @@ def explanation_figure(situation: Situation, places: tuple[Place, ...], view: Se
     return result
 
 
-def _draw_image(axes: Axes, situation: Situation, image: NDArray[np.uint8]) -> None:
-    axes.imshow(image)
+def _draw_image(axes: Axes, situation: Situation, picture: Picture, name: str) -> None:
+    """An image with its boxes; without a name it gets that of its camera's frame."""
+    axes.imshow(picture.pixels)
     axes.set_axis_off()
-    found = situation.detections
+    found = picture.detections
     if found is None:
         axes.set_title("image, without detections", loc="left", fontsize=9)
         return
     apart_ms = (found.stamp_ns - situation.stamp_ns) / 1e6
-    axes.set_title(f"image, {apart_ms:+.0f} ms beside the scan", loc="left", fontsize=9)
+    axes.set_title(f"{name or found.frame_id}, {apart_ms:+.0f} ms beside the scan", loc="left", fontsize=9)
     for (x1, y1, x2, y2), options in zip(found.boxes_xyxy.tolist(), found.hypotheses, strict=True):
         axes.add_patch(Rectangle((x1, y1), x2 - x1, y2 - y1, fill=False, edgecolor=_BOX, linewidth=1.4))
         if options:

@@ -3,8 +3,9 @@
 import contextlib
 import dataclasses
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +27,10 @@ from mcap_landmarks.errors import MessageError, RecordingError, UsageError
 from mcap_landmarks.evaluation.explain import Situation
 from mcap_landmarks.geometry.frames import FrameTree, apply, rigid
 from mcap_landmarks.geometry.se2 import Array
-from mcap_landmarks.inspection.topic_roles import Choice, choose, message_type
+from mcap_landmarks.inspection.topic_roles import Choice, cameras_of, choose, message_type
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.locations import Location
-from mcap_landmarks.manifest import RUN
+from mcap_landmarks.manifest import RUN, stage_records
 from mcap_landmarks.messages.codec import M, Message, decode
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CompressedImage, Image
@@ -45,35 +46,44 @@ _OF_BUNDLE = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, SCAN_OBJECTS)
 _BESIDE = (DETECTIONS, CAMERA_IMAGE, SCAN)
 
 
+class Picture(NamedTuple):
+    """The pixels (H, W, 3) of an image, and what was detected in it, if the log tells."""
+
+    pixels: NDArray[np.uint8]
+    detections: Detections | None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SensorData:
-    """What the sensors saw: the image (H, W, 3) of the detections, and the scan as points (N, 2) in the base frame."""
+    """What the sensors saw: the images of the detections, and the scan as points (N, 2) in the base frame."""
 
-    image: NDArray[np.uint8] | None = None
+    pictures: tuple[Picture, ...] = ()
     scan_xy: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Around:
-    """The messages around a moment, by channel and by the times that they are of."""
+    """The messages around a moment, by channel, time and camera, which is empty where it does not matter."""
 
-    messages: dict[Channel[Message], dict[int, Message]]
+    messages: dict[Channel[Message], dict[tuple[int, str], Message]]
 
     def at(self, channel: Channel[M], time_ns: int) -> M | None:
         """The message of a time."""
-        message = self.messages[channel].get(time_ns)
+        message = self.messages[channel].get((time_ns, ""))
         return message if isinstance(message, channel.message) else None
 
-    def nearest(self, channel: Channel[Message], time_ns: int) -> Message | None:
-        """The message nearest to a time, None if it is too far away."""
+    def nearest(self, channel: Channel[Message], time_ns: int, camera: str) -> Message | None:
+        """The message of a camera that is nearest to a time, None if it is too far away."""
         messages = self.messages[channel]
-        nearest_ns = min(messages, key=lambda other_ns: abs(other_ns - time_ns), default=None)
-        return None if nearest_ns is None or abs(nearest_ns - time_ns) > _BESIDE_NS else messages[nearest_ns]
+        times = [key for key in messages if key[1] == camera]
+        nearest = min(times, key=lambda key: abs(key[0] - time_ns), default=None)
+        return None if nearest is None or abs(nearest[0] - time_ns) > _BESIDE_NS else messages[nearest]
 
-    def detections(self, time_ns: int) -> Detections | None:
-        """The detections nearest to a time."""
-        found = self.nearest(DETECTIONS, time_ns)
-        return found if isinstance(found, Detections) else None
+    def detections(self, time_ns: int) -> dict[str, Detections]:
+        """The detections nearest to a time, by camera."""
+        cameras = sorted({camera for _, camera in self.messages[DETECTIONS]})
+        found = {camera: self.nearest(DETECTIONS, time_ns, camera) for camera in cameras}
+        return {camera: message for camera, message in found.items() if isinstance(message, Detections)}
 
 
 def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
@@ -83,20 +93,23 @@ def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
         RecordingError: the log cannot be read, or has no bundle within three seconds.
     """
     with open_recording(path) as recording:
-        channels = {c: channel for channel in (*_OF_BUNDLE, *_BESIDE) for c in _connections(recording, channel)}
+        choice = _choice(recording)
+        channels = {c: channel for channel in (*_OF_BUNDLE, *_BESIDE) for c in _connections(recording, channel, choice)}
         found = _Around({channel: {} for channel in (*_OF_BUNDLE, *_BESIDE)})
+        frames = cameras_of(recording, choice).frames()
         for raw in recording.messages(channels, at_ns - _AROUND_NS, at_ns + _AROUND_NS):
             channel = channels[raw.connection]
             with contextlib.suppress(MessageError):
                 message = decode(message_type(channel, raw.connection), raw.data, _schema(raw.connection))
-                found.messages[channel][getattr(message, "stamp_ns", 0) or raw.log_time_ns] = message
+                camera = message.frame_id if isinstance(message, Detections) else frames.get(raw.connection.topic, "")
+                found.messages[channel][getattr(message, "stamp_ns", 0) or raw.log_time_ns, camera] = message
         bundles = found.messages[MATCH] or found.messages[SCENE_OBJECTS]
         if not bundles:
             raise RecordingError(
                 f"{path}: no bundle with scene objects within 3 s of {at_ns}; the log goes from {recording.start_ns} "
                 f"to {recording.end_ns}, and localize writes what is explained"
             )
-        stamp_ns = min(bundles, key=lambda time_ns: abs(time_ns - at_ns))
+        stamp_ns = min((time_ns for time_ns, _ in bundles), key=lambda time_ns: abs(time_ns - at_ns))
         return _situation(recording, found, stamp_ns), _view(recording, found, stamp_ns)
 
 
@@ -110,7 +123,7 @@ def _situation(recording: Recording, found: _Around, stamp_ns: int) -> Situation
         None if pose is None else pose.pose,
         None if spread is None else spread.planar_covariance,
         found.at(SCAN_OBJECTS, stamp_ns),
-        found.detections(stamp_ns),
+        tuple(found.detections(stamp_ns).values()),
         _config(recording),
     )
 
@@ -131,16 +144,17 @@ def _schema(connection: Connection) -> str:
 
 
 def _view(recording: Recording, found: _Around, stamp_ns: int) -> SensorData:
-    detections = found.detections(stamp_ns)
-    image = found.nearest(CAMERA_IMAGE, stamp_ns if detections is None else detections.stamp_ns)
-    pixels = None
-    if isinstance(image, CompressedImage | Image):
-        with contextlib.suppress(MessageError):
-            pixels = rgb_from_message(image)
+    pictures, detections = list[Picture](), found.detections(stamp_ns)
+    for camera in sorted({camera for _, camera in found.messages[CAMERA_IMAGE]}):
+        boxes = detections.get(camera) if camera else next(iter(detections.values()), None)
+        image = found.nearest(CAMERA_IMAGE, stamp_ns if boxes is None else boxes.stamp_ns, camera)
+        if isinstance(image, CompressedImage | Image):
+            with contextlib.suppress(MessageError):
+                pictures.append(Picture(rgb_from_message(image), boxes))
     scene, scan = found.at(SCENE_OBJECTS, stamp_ns), found.at(SCAN, stamp_ns)
     if scan is None or scene is None:
-        return SensorData(pixels)
-    return SensorData(pixels, _points(recording, scan, scene.frame_id))
+        return SensorData(tuple(pictures))
+    return SensorData(tuple(pictures), _points(recording, scan, scene.frame_id))
 
 
 def _points(recording: Recording, scan: LaserScan, base: str) -> Array:
@@ -160,10 +174,24 @@ def _points(recording: Recording, scan: LaserScan, base: str) -> Array:
     return points[:, :2]
 
 
-def _connections(recording: Recording, channel: Channel[Message]) -> Iterable[Connection]:
+def _choice(recording: Recording) -> Choice:
+    """Which images the detections are of, as the log tells."""
+    record = stage_records(recording.metadata).get("detect")
+    options = {} if record is None else record.options
+    topics, images = options.get("topics"), options.get("images")
+    chosen = {"image": str(topics["image"])} if isinstance(topics, Mapping) and "image" in topics else {}
+    choice = Choice(chosen, images=tuple(map(str, images)) if isinstance(images, list) else ())
+    try:
+        cameras_of(recording, choice)
+    except UsageError:  # the images are not in this log
+        return Choice(chosen)
+    return choice
+
+
+def _connections(recording: Recording, channel: Channel[Message], choice: Choice) -> Iterable[Connection]:
     """The connections that play a channel's part; none where several could, since one too many would mislead."""
     try:
-        return choose(recording, channel, Choice())
+        return choose(recording, channel, choice)
     except UsageError:
         return ()
 
