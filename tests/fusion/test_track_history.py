@@ -105,6 +105,8 @@ def test_a_track_can_be_in_a_box_that_is_as_tall_as_its_class() -> None:
 def test_a_track_with_a_box_of_its_own_in_the_image_was_not_in_another_one() -> None:
     own = TrackHistory(boxes=[seen_at(2)], places={1: at(5), 2: at(5)})
     assert own.could_be([seen_at(1), seen_at(2)], SIZE, NOW).tolist() == [True, False]
+    other_camera = dataclasses.replace(seen_at(2), frame_id="rear")
+    assert own.could_be([other_camera], SIZE, NOW).tolist() == [True]
 
 
 def test_where_it_was_counts_and_else_where_it_is() -> None:

@@ -22,8 +22,14 @@ COUNT = 40
 Change = Callable[[Stamped], Stamped | None]
 
 
-def findings(tmp_path: Path, change: Change) -> list[Finding]:
+def findings(tmp_path: Path, change: Change, second: bool = False) -> list[Finding]:
+    """What is found in a changed log, which may have a second camera without a CameraInfo."""
     content = [changed for stamped in raw_messages(COUNT) if (changed := change(stamped)) is not None]
+    images = [stamped for stamped in content if stamped.channel == CAMERA_IMAGE] if second else []
+    rear = Channel("/rear/image_raw", CAMERA_IMAGE.message)
+    for one in images:
+        message = dataclasses.replace(one.message, frame_id="rear")
+        content.append(Stamped(rear, one.log_time_ns, message))
     content.sort(key=lambda stamped: stamped.log_time_ns)
     (log,) = describe(write(tmp_path / "log.mcap", content), {}, unwatched)
     return list(log.findings or ())
@@ -105,6 +111,10 @@ PLANTED: dict[str, tuple[Change, set[tuple[str, str, str]]]] = {
     "no camera_info": (of(CAMERA_INFO, lambda _: None), {("camera", "/camera/image_raw/compressed", "no camera_info")}),
     "camera_info from before a cut": (of(CAMERA_INFO, lambda s: late(s, 7 * SECOND)), set()),
     "no calibration": (of(CAMERA_INFO, uncalibrated), {("camera", "/camera/camera_info", "not calibrated")}),
+    "a second camera": (
+        lambda stamped: stamped,
+        {("camera", "", "images are on 2 topics"), ("camera", "/rear/image_raw", "no camera_info goes with")},
+    ),
     "blind beams": (
         of(SCAN, lambda s: blind(s, slice(45, 60))),
         {("beams", "/scan", "15 of 180 beams never returned anything in 40 scans: 90 to 118 deg")},
@@ -120,7 +130,7 @@ def test_what_is_planted_is_found_and_only_that(tmp_path: Path, name: str) -> No
     def seeing(stamped: Stamped) -> Stamped | None:  # all beams return something, but for what is planted
         return change(everywhere(stamped))
 
-    found = findings(tmp_path, seeing)
+    found = findings(tmp_path, seeing, second=name == "a second camera")
     assert {(finding.check, finding.topic) for finding in found} == {(check, topic) for check, topic, _ in expected}
     for check, topic, words in expected:
         texts = [finding.text for finding in found if (finding.check, finding.topic) == (check, topic)]

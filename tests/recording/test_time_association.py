@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from mcap_landmarks.channels import DETECTIONS, ODOMETRY, SCENE_OBJECTS, TF_STATIC
+from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, ODOMETRY, SCENE_OBJECTS, TF_STATIC
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.poses import Odometry, PoseStamped
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
@@ -158,8 +159,8 @@ def beside(scenes_ms: list[int], images_ms: list[int], late_ms: int = 0) -> tupl
     return [None if partner is None else partner.stamp_ns // 10**6 for partner in partners], counts
 
 
-def image(stamp_ns: int) -> Detections:
-    return Detections(stamp_ns, "camera", (), (), np.zeros((0, 4)))
+def image(stamp_ns: int, frame: str = "camera") -> Detections:
+    return Detections(stamp_ns, frame, (), (), np.zeros((0, 4)))
 
 
 @pytest.mark.parametrize("late_ms", [0, 30, 900])
@@ -182,6 +183,54 @@ def test_an_image_too_far_away_belongs_to_none() -> None:
     found, counts = beside([1000, 2000], [600, 1500, 2249])
     assert found == [None, 2249]
     assert counts.unpaired == {DETECTIONS.topic: 2}
+
+
+def of_cameras(scenes_ms: list[int], images_ms: dict[str, list[int]], late_ms: int = 0) -> list[dict[str, int]]:
+    """Milliseconds of the images beside each scene, by camera; those of the camera `late` are logged late."""
+    messages = [(at, SCENE_OBJECTS, scene(at * 10**6)) for at in scenes_ms]
+    for frame, times in images_ms.items():
+        messages += [(at + late_ms * (frame == "late"), DETECTIONS, image(at * 10**6, frame)) for at in times]
+    stream = [(channel, at * 10**6, message) for at, channel, message in sorted(messages, key=lambda entry: entry[0])]
+    bundles = associate(
+        stream, SCENE_OBJECTS, Association(), with_odometry=False, beside=[DETECTIONS], by_frame={DETECTIONS: 1}
+    )
+    return [{one.frame_id: one.stamp_ns // 10**6 for one in bundle.each(DETECTIONS)} for bundle in bundles]
+
+
+@pytest.mark.parametrize("late_ms", [0, 150])
+def test_of_every_camera_the_nearest_image_is_beside_a_bundle(late_ms: int) -> None:
+    images = {"front": [*range(113, 2000, 100)], "late": [*range(80, 2000, 200)]}
+    found = of_cameras([*range(100, 2000, 200)], images, late_ms)
+    assert found == [{"front": 113 + 200 * i, "late": 80 + 200 * i} for i in range(10)]
+
+
+def test_a_camera_without_an_image_near_by_keeps_no_other_one_from_its_bundle() -> None:
+    found = of_cameras([1000, 1600, 2200], {"front": [1010, 1610, 2210], "rear": [1600]})
+    assert found == [{"front": 1010}, {"front": 1610, "rear": 1600}, {"front": 2210}]
+
+
+def test_what_is_held_of_every_camera_is_awaited() -> None:
+    infos = [
+        CameraInfo(1, frame, 48, 64, "", np.zeros(0), np.eye(3), np.eye(3), np.eye(3, 4)) for frame in ("front", "rear")
+    ]
+    stream = [(CAMERA_INFO, 1, infos[0]), (SCENE_OBJECTS, 2, scene(2)), (CAMERA_INFO, SECOND, infos[1])]
+    stream += [(SCENE_OBJECTS, 2 * SECOND, scene(2 * SECOND))]
+    both, alone = (
+        [
+            [info.frame_id for info in bundle.each(CAMERA_INFO)]
+            for bundle in associate(
+                stream,
+                SCENE_OBJECTS,
+                Association(),
+                with_odometry=False,
+                held=[CAMERA_INFO],
+                by_frame={CAMERA_INFO: count},
+            )
+        ]
+        for count in (2, 1)
+    )
+    assert both == [["front", "rear"]] * 2
+    assert alone == [["front"], ["front", "rear"]]
 
 
 def test_odometry_comes_as_poses_and_as_transforms() -> None:

@@ -53,6 +53,17 @@ def test_images_are_taken_after_motion_or_turning() -> None:
     assert kept(raws, Thinning(every_rad=math.radians(5)))[0] == [1, 41]
 
 
+def test_each_of_several_cameras_is_thinned_by_itself() -> None:
+    """The first camera's images must not be the only ones because they always come a little earlier."""
+    rear = Connection("/rear/image_raw", "", b"")
+    raws = [odometry(0, 0, 0, 0)]
+    for i in range(1, 9):
+        raws += [odometry(100 * i, 0.1 * i, 0, 0), image(100 * i + 1), RawMessage(rear, 100 * i + 2, 0, 0, b"")]
+    for thinning in (Thinning(1e9 / 200), Thinning(every_m=0.19)):
+        left = [raw for raw in thin(raws, [IMAGES, rear], [ODOM], thinning, Counter()) if raw.connection is not ODOM]
+        assert [raw.connection for raw in left] == [IMAGES, rear] * 4
+
+
 def test_without_odometry_so_far_every_image_is_taken() -> None:
     raws = [image(1), image(2), odometry(3, 0, 0, 0), image(4), odometry(5, math.nan, 0, 0), image(6)]
     assert kept(raws, Thinning(every_m=0.2))[0] == [1, 2, 4]
