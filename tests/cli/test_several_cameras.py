@@ -111,9 +111,11 @@ def test_from_images_to_a_map_verb_by_verb(here: Path, capsys: pytest.CaptureFix
     classes, places = last_scene(fused)
     assert sorted(classes) == sorted(NAMES)
     assert len(places) == len(STANDING)
-    assert call("map", fused, "--map", here / "map.db", "--json") == 0
+    words = ("--map", here / "map.db", "--model", here / "model.onnx", "--json")
+    assert call("map", fused, *words) == 0  # the choice of images stays
     found = json.loads(capsys.readouterr().out)
     assert found["landmarks"] + found["tentative"] == len(STANDING)
+    assert found["stages"] == {"detect": "reused", "cluster": "reused", "fuse": "reused", "build_map": "ran"}
 
 
 def test_in_one_go_topics_are_chosen_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,5 +1,6 @@
 """Which topics of a recording play which role: found by message type, or chosen by the user."""
 
+import contextlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -138,6 +139,19 @@ def cameras_of(recording: Readable, choice: Choice) -> Cameras:
         UsageError: see `cameras`.
     """
     return cameras(recording, _named(recording, choice), choice.images) if choice.images else NO_CAMERAS
+
+
+def chosen_before(recording: Readable, options: Iterable[Mapping[str, object]]) -> Choice:
+    """The images in a recording that results in it were made of, as the options of their stages tell."""
+    for told in options:
+        topics, images = told.get("topics"), told.get("images")
+        choice = Choice(images=tuple(map(str, images)) if isinstance(images, list) else ())
+        if isinstance(topics, Mapping) and "image" in topics:
+            choice = Choice({"image": str(topics["image"])})
+        with contextlib.suppress(UsageError):
+            if (choice.images or choice.topics) and choose(recording, channels.CAMERA_IMAGE, choice):
+                return choice
+    return Choice()
 
 
 def _named(recording: Readable, choice: Choice) -> list[tuple[str, Connection]]:

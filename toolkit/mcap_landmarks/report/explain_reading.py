@@ -3,7 +3,7 @@
 import contextlib
 import dataclasses
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ from mcap_landmarks.errors import MessageError, RecordingError, UsageError
 from mcap_landmarks.evaluation.explain import Situation
 from mcap_landmarks.geometry.frames import FrameTree, apply, rigid
 from mcap_landmarks.geometry.se2 import Array
-from mcap_landmarks.inspection.topic_roles import Choice, cameras_of, choose, message_type
+from mcap_landmarks.inspection.topic_roles import Choice, cameras_of, choose, chosen_before, message_type
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, stage_records
@@ -93,7 +93,8 @@ def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
         RecordingError: the log cannot be read, or has no bundle within three seconds.
     """
     with open_recording(path) as recording:
-        choice = _choice(recording)
+        records = stage_records(recording.metadata).values()
+        choice = chosen_before(recording, [record.options for record in records])
         channels = {c: channel for channel in (*_OF_BUNDLE, *_BESIDE) for c in _connections(recording, channel, choice)}
         found = _Around({channel: {} for channel in (*_OF_BUNDLE, *_BESIDE)})
         frames = cameras_of(recording, choice).frames()
@@ -172,20 +173,6 @@ def _points(recording: Recording, scan: LaserScan, base: str) -> Array:
     with contextlib.suppress(RecordingError):
         points = apply(FrameTree.of(edges).lookup(base, scan.frame_id), points)
     return points[:, :2]
-
-
-def _choice(recording: Recording) -> Choice:
-    """Which images the detections are of, as the log tells."""
-    record = stage_records(recording.metadata).get("detect")
-    options = {} if record is None else record.options
-    topics, images = options.get("topics"), options.get("images")
-    chosen = {"image": str(topics["image"])} if isinstance(topics, Mapping) and "image" in topics else {}
-    choice = Choice(chosen, images=tuple(map(str, images)) if isinstance(images, list) else ())
-    try:
-        cameras_of(recording, choice)
-    except UsageError:  # the images are not in this log
-        return Choice(chosen)
-    return choice
 
 
 def _connections(recording: Recording, channel: Channel[Message], choice: Choice) -> Iterable[Connection]:

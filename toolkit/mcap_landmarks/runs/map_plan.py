@@ -74,13 +74,13 @@ def plan_map(task: MapTask, parts: Path) -> MapPlan:
 
 def _plan_log(place: str, config: Config, request: Request, task: MapTask, parts: Path) -> LogPlan:
     with open_session(request, parts, None) as session:
-        log, choice = session.log, request.span.choice
+        log, choice = session.log, session.request.span.choice
         sensed = [channel for channel in STAGE.required if not is_result(channel, choice)]
         inputs_of(log.without_results(), sensed, sensed, choice)  # before hours are spent on the other stages
-        steps = tuple(plan(request, log, missing_stages(STAGE, log, request.use)))
+        steps = tuple(plan(session.request, log, missing_stages(STAGE, log, request.use)))
         inputs, options = inputs_of_stage(STAGE, log, steps), choice_options(choice, STAGE.reads)
         record = record_of(STAGE, config, task.files, inputs, options)
-        return LogPlan(place, request, log.recording.fingerprint(), steps, record)
+        return LogPlan(place, session.request, log.recording.fingerprint(), steps, record)
 
 
 def _check_each_once(logs: Sequence[LogPlan]) -> None:

@@ -52,10 +52,10 @@ def run_stages(
     check_output(request.recording, output)
     with parts_folder(output) as parts, open_session(request, parts, output) as session:
         if lacking:
-            use = (*request.use, *names)
+            use = (*session.request.use, *names)
             before = [other for name in names for other in missing_stages(find_stage(name), session.log, use)]
             names = in_order([*before, *names])
-        runs = [session.work(step, watch) for step in plan(request, session.log, names)]
+        runs = [session.work(step, watch) for step in plan(session.request, session.log, names)]
         notes, losses = write_output(session, output, verb, [session.log.recording.fingerprint()], watch)
         return LogRun(request.recording, output, tuple(runs), *told(runs, notes, losses))
 

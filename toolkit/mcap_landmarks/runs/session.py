@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mcap_landmarks.channels import SHARED
 from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.inspection.topic_roles import chosen_before
 from mcap_landmarks.manifest import Outcome, StageRecord
 from mcap_landmarks.recording.layered_log import Layer, LayeredLog, result_layers
 from mcap_landmarks.recording.reader import Recording, open_recording
@@ -64,12 +65,26 @@ def part_file(folder: Path, record: StageRecord) -> Path:
 def open_session(request: Request, parts: Path, output: Path | None) -> Iterator["Session"]:
     """One log to work on, with the results that lie in the log, in an earlier `output` and among the `parts`.
 
+    Where the request chooses no images, those count that results in the log were made of.
+
     Raises:
         RecordingError: the log cannot be read.
     """
     with ExitStack() as stack:
-        log = RecordedLog(stack.enter_context(open_recording(request.recording)), request.span)
-        yield Session(stack, request, log, parts, output)
+        recording = stack.enter_context(open_recording(request.recording))
+        asked = _with_images(request, recording)
+        yield Session(stack, asked, RecordedLog(recording, asked.span), parts, output)
+
+
+def _with_images(request: Request, recording: Recording) -> Request:
+    """A request that chooses the images that results in the log were made of, unless it chooses its own."""
+    choice = request.span.choice
+    if choice.images or "image" in choice.topics:
+        return request
+    records = [layer.record for layer in result_layers(recording).values()]
+    before = chosen_before(recording, [record.options for record in records if record is not None])
+    chosen = replace(choice, topics={**choice.topics, **before.topics}, images=before.images)
+    return replace(request, span=replace(request.span, choice=chosen))
 
 
 class Session:
