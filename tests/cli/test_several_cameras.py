@@ -170,6 +170,32 @@ def test_a_single_camera_is_as_it_was(here: Path) -> None:
     assert topics(here / "one.mcap").keys() == {DETECTIONS.topic, "/front/annotations"}
 
 
+def test_cameras_whose_topics_do_not_lie_apart_are_told_by_their_frames(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """And of what cannot be read the topic is told."""
+    flat = []
+    for stamped in messages("front", "left"):
+        name = stamped.channel.topic.split("/")[1]
+        message, topic = stamped.message, stamped.channel.topic
+        if isinstance(message, CompressedImage):
+            is_broken = name == "left" and stamped.log_time_ns > 300_000_000
+            message = dataclasses.replace(message, frame_id=f"{name}_optical", data=b"" if is_broken else message.data)
+            topic = f"/image_{name}"
+        if isinstance(message, CameraInfo):
+            topic = f"/info_{name}"
+        flat.append(Stamped(Channel(topic, type(message)), stamped.log_time_ns, message))
+    log, out = write(here / "flat.mcap", flat), here / "out.mcap"
+    words = ("run", log, "--stages", "detect,cluster,fuse", "--model", here / "model.onnx", "-o", out)
+    assert call(*words, "--image", "all") == 3
+    assert f"warning: {out}: /image_left: {COUNT - 1} messages could not be decoded in all" in capsys.readouterr().err
+    assert len(last_scene(out)[0]) == len(STANDING)
+    assert topics(out)["/image_front/annotations"] == COUNT
+    assert topics(out)["/image_left/annotations"] == 1
+    assert call("detect", log, "-o", out, "--model", here / "model.onnx", "--image", "/image_left") == 3
+    assert call("fuse", here / "out.mcap", "-o", here / "no.mcap") == 1  # there are no scan objects yet
+
+
 def test_a_camera_without_a_place_on_the_robot_is_named(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     content = [
         dataclasses.replace(one, message=TFMessage(one.message.transforms[:-1])) if one.channel == TF_STATIC else one

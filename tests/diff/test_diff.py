@@ -4,6 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -11,11 +12,12 @@ from mcap_landmarks import channels
 from mcap_landmarks.diff import logs as diff_logs
 from mcap_landmarks.diff.comparison import diff
 from mcap_landmarks.messages.codec import decode, encode
+from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.match import Condition, LandmarkMatch, Status
 from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import create_recording
-from mcap_landmarks.stage import RawMessage, Stamped
+from mcap_landmarks.stage import Channel, RawMessage, Stamped
 
 from tests.diff.changes import CHANGES, SAME, replace, shifted
 from tests.diff.recordings import localized_log, localized_messages, write
@@ -157,6 +159,20 @@ def test_a_topic_of_two_types_is_compared_by_its_bytes(tmp_path: Path) -> None:
     assert [row["what"] for row in document["structure"]] == ["type"]
     assert counts(document["channels"]["/status"]) == (BUNDLES, 0, 0)
     assert set(document["channels"]["/status"]["fields"]) == {"content"}
+
+
+def test_an_image_that_one_camera_lost_is_its_own(tmp_path: Path) -> None:
+    """Cameras that are triggered together have images of one time, and their boxes lie in one channel."""
+
+    def seen(frame: str, left_px: float, stamp_ns: int) -> tuple[Channel, int, Detections]:
+        box = np.array([[left_px, 10.0, left_px + 50.0, 90.0]])
+        return channels.DETECTIONS, stamp_ns, Detections(stamp_ns, frame, ("",), ((("person", 0.8),),), box)
+
+    content = [seen(frame, left, START_NS + i) for i in range(3) for frame, left in (("front", 10.0), ("rear", 300.0))]
+    found = diff(write(tmp_path / "a.mcap", content), write(tmp_path / "b.mcap", [*content[:2], *content[3:]]))
+    channel = found.document["channels"][channels.DETECTIONS.topic]
+    assert counts(channel) == (0, 0, 1)
+    assert channel["messages"] == {"same": 5, "changed": 0, "added": 0, "removed": 1}
 
 
 def test_equal_files_are_not_read(tmp_path: Path) -> None:

@@ -136,7 +136,9 @@ def test_what_is_missing_for_a_camera_is_named() -> None:
     image = [seen(LEFT, AROUND), seen(SIDE, AROUND)]
     with pytest.raises(RecordingError, match="no transforms lead from side to base_footprint"):
         fused([bundle(AROUND, image, (LEFT, RIGHT), infos=[LEFT.info, SIDE.info])])
-    with pytest.raises(RecordingError, match=r"is of the frame 'side'.*but of left, right; choose.*--image TOPIC"):
+    with pytest.raises(RecordingError, match=r"is of the frame 'side'.*but of left and right; record.*--image TOPIC"):
         fused([bundle(AROUND, image, (LEFT, RIGHT))])
+    with pytest.raises(RecordingError, match=r"is of the frame 'side'.*but of left; record"):
+        fused([bundle(AROUND, image, infos=[LEFT.info])])  # never another camera's
     with pytest.raises(UsageError, match="the thesis's method has one camera; choose it with --image TOPIC"):
         fused([bundle(AROUND, image)], FuseConfig(method="thesis"))

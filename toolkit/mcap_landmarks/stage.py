@@ -185,11 +185,15 @@ class Bundle:
 
 @dataclass(frozen=True, slots=True)
 class Omission:
-    """Something that a stage left out: `lost` where the source data are unreadable, else by a rule of its own."""
+    """Something that a stage left out: `lost` where the source data are unreadable, else by a rule of its own.
+
+    `frame_id` is that of what is lost, where it may be one of several cameras'.
+    """
 
     log_time_ns: int
     reason: str
     lost: bool = False
+    frame_id: str = ""
 
 
 class Tolerance(NamedTuple):

@@ -14,7 +14,9 @@ from mcap_landmarks.diff.fields import ComparedMessages, Fields, compared, unit_
 from mcap_landmarks.diff.pairs import pair_keys
 from mcap_landmarks.diff.values import Rows
 from mcap_landmarks.errors import MessageError
+from mcap_landmarks.inspection.cameras import frame_in
 from mcap_landmarks.messages.columns import Column, Kind
+from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.layout import Layout, layout_of
 from mcap_landmarks.messages.typestore import definition, typestore
 from mcap_landmarks.recording.reader import Recording
@@ -30,6 +32,7 @@ _STAMP = Struct("<iI")
 
 class _Held(NamedTuple):
     key_ns: int
+    camera: str
     log_time_ns: int
     data: bytes
 
@@ -72,19 +75,20 @@ class Topic:
 
     def hold(self, side: int, raw: RawMessage) -> int:
         """Keep a message until its partner comes; the bytes that this takes."""
-        data, key_ns = bytes(raw.data), raw.log_time_ns
+        data, key_ns, camera = bytes(raw.data), raw.log_time_ns, ""
         if self.layouts is None:
             data = _digest(data)
         elif self.layouts[side].stamped and len(data) >= 12:
             seconds, nanoseconds = _STAMP.unpack_from(data, 4)
             key_ns = seconds * 10**9 + nanoseconds or key_ns
-        self.waiting[side].append(_Held(key_ns, raw.log_time_ns, data))
+            camera = frame_in(data) if self.form == Detections.ROS_TYPE else ""  # several have one channel
+        self.waiting[side].append(_Held(key_ns, camera, raw.log_time_ns, data))
         return len(data)
 
     def compare(self, until_ns: int) -> int:
         """Compare what has its partner, give up what is older than `until_ns`; the bytes that are still held."""
         mine, theirs = self.waiting
-        pairs = pair_keys([held.key_ns for held in mine], [held.key_ns for held in theirs])
+        pairs = pair_keys(*([(held.key_ns, held.camera) for held in side] for side in self.waiting))
         paired = zip(pairs.baseline.tolist(), pairs.candidate.tolist(), strict=True)
         self._compare_partners([(mine[i], theirs[j]) for i, j in paired])
         mine[:], theirs[:] = (

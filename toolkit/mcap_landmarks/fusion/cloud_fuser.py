@@ -43,12 +43,8 @@ class CloudFuser:
         seen_as = [views[0].thing.name for views in objects]
         names = self._motions.names(cloud.stamp_ns, odometry, (centres, spreads), seen_as)
         classes = [self._learn(name, views) for name, views in zip(names, objects, strict=True)]
-        placed = [_as(views[0], options[0][0]) for views, options in zip(objects, classes, strict=True)]
-        upright = [
-            views[0].look.upright(one, options[0][0])
-            for views, one, options in zip(objects, placed, classes, strict=True)
-        ]
-        scene = _scene(cloud, names, classes, [one.place for one in placed], np.array(upright).reshape(-1, 2))
+        best = [options[0][0] for options in classes]
+        scene = _scene(cloud, names, classes, *_placed([views[0] for views in objects], best))
         explained = sum(one.thing.boxes for views in objects for one in views)
         return scene, sum(len(image.detections) for image in images) - explained
 
@@ -61,6 +57,13 @@ class CloudFuser:
         whole = sum(told.values())
         options = sorted(((known, score * weight / whole) for known, weight in told.items()), key=lambda one: -one[1])
         return tuple((known, share) for known, share in options if share >= _LEAST_TOLD)
+
+
+def _placed(objects: Sequence[ViewedObject], names: Sequence[str]) -> tuple[list[Rectangle], Array]:
+    """Where objects are, each as one of the class of its track, and the heights (N, 2) of their feet and their own."""
+    found = [_as(seen, name) for seen, name in zip(objects, names, strict=True)]
+    upright = [seen.look.upright(one, name) for seen, one, name in zip(objects, found, names, strict=True)]
+    return [one.place for one in found], np.array(upright).reshape(-1, 2)
 
 
 def _as(seen: ViewedObject, name: str) -> FoundObject:

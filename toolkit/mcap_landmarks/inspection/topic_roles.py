@@ -176,6 +176,9 @@ def _only(recording: Readable, channel: Channel[Message], fitting: list[str], ch
         if len(images) != 1:  # boxes say by their frame whose they are
             return fitting
         fitting = _of_the_image(images[0], fitting)
+        if len(fitting) > 1:
+            info = cameras(recording, _named(recording, choice), images).used[0].info
+            fitting = fitting if info is None else [info]
     if len(fitting) > 1:
         how = f"{role.option} TOPIC" if role.option != "--remap" else f"--remap TOPIC={channel.topic}"
         how += ", twice to merge two" if channel == channels.SCAN else ""

@@ -58,7 +58,8 @@ def naming(path: Location, results: Iterator[Stamped | Omission]) -> Iterator[St
 
 def _omit(omission: Omission, log: StageInput) -> None:
     if omission.lost:
-        log.reading.lose(log.primary.topic, omission.log_time_ns, omission.reason)
+        source = log.by_frame().get(omission.frame_id, log)
+        log.reading.lose(source.primary.topic, omission.log_time_ns, omission.reason)
     else:
         log.reading.dropped[omission.reason] += 1
 
@@ -73,15 +74,17 @@ def _writes(stage: Stage, log: StageInput, config: Config) -> tuple[Places, tupl
     """
     writes, notes = Places(), dict[str, None]()
     for channel in stage.writes:
-        views = log.by_frame() if channel in stage.places else {}
-        taken = set[str]()
-        for frame, view in (views or {"": log}).items():
-            topic = stage.places[channel](view, config) if channel in stage.places else channel.topic
+        views = (log.by_frame() if channel in stage.places else {}) or {"": log}
+        topics = {
+            frame: stage.places[channel](view, config) if channel in stage.places else channel.topic
+            for frame, view in views.items()
+        }
+        for frame, topic in topics.items():
             if isinstance(topic, LeftOut):
                 notes[topic.reason] = None
                 continue
-            if topic in taken:  # of several cameras, whose topics do not lie apart
-                topic = f"{view.primary.topic}/{topic.rpartition('/')[2]}"
-            taken.add(topic)
-            writes[channel, frame] = Channel(topic, channel.message)
+            # Topics of several cameras need not lie apart; below those of their images results do.
+            is_alone = list(topics.values()).count(topic) == 1
+            own = topic if is_alone else f"{views[frame].primary.topic}/{topic.rpartition('/')[2]}"
+            writes[channel, frame] = Channel(own, channel.message)
     return writes, tuple(notes)

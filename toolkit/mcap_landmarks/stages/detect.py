@@ -53,7 +53,8 @@ def process(
         read += 1
         if isinstance(result, MessageError):
             failed, error = failed + 1, error or result
-            yield Omission(bundle.log_time_ns, str(result), lost=True)
+            frame_id = getattr(bundle.messages[CAMERA_IMAGE], "frame_id", "")
+            yield Omission(bundle.log_time_ns, str(result), lost=True, frame_id=frame_id)
             continue
         rgb, prepared, outputs = result
         found = find(outputs, prepared, detector, above, config)

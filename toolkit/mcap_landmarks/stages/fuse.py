@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -50,20 +50,19 @@ def process(
     """
     motions = ObjectMotions()
     fusers = _Fusers(config, Fuser(config), CloudFuser(config, motions))
-    mounting = Mounting(resources.get("extrinsics"))
-    scans = images = 0
+    scans, cameras = 0, _Cameras(config, Mounting(resources.get("extrinsics")))
     for bundle in bundles:
         found = bundle.get(SCAN_OBJECTS)
         if found is None:
             continue
-        objects, given = usable(found), bundle.each(DETECTIONS)
-        scans, images = scans + 1, images + len(given)
+        objects, scans = usable(found), scans + 1
         detections, left_out = list[Detections](), Counter[str]()
-        for one in given:
-            kept, reasons = wanted(one, config)
+        for given in bundle.each(DETECTIONS):
+            cameras.frames.add(plain(given.frame_id))
+            kept, reasons = wanted(given, config)
             detections.append(kept)
             left_out += reasons
-        scene, unexplained = _fused(bundle, objects, detections, fusers, mounting)
+        scene, unexplained = _fused(bundle, objects, detections, fusers, cameras)
         scene, too_few = at_least(scene, config.min_objects)
         yield Stamped(SCENE_OBJECTS, bundle.log_time_ns, scene)
         yield Stamped(SCENE_MARKERS, bundle.log_time_ns, markers_from_scene(scene))
@@ -73,7 +72,7 @@ def process(
         left_out.update(too_few)
         left_out.update({_UNEXPLAINED: unexplained, _UNUSABLE: len(found) - len(objects)})
         yield from (Omission(bundle.log_time_ns, reason) for reason in left_out.elements())
-    if scans and not images:
+    if scans and not cameras.frames:
         raise RecordingError(
             f"no {DETECTIONS.topic} lie beside any of {scans} scans; run mcap-landmarks detect first, or read others "
             f"with --remap TOPIC={DETECTIONS.topic}"
@@ -89,48 +88,54 @@ class _Fusers:
     clouds: CloudFuser
 
 
+@dataclass(frozen=True, slots=True)
+class _Cameras:
+    """The cameras on the robot; `frames` are those that there were detections of so far."""
+
+    config: FuseConfig
+    mounting: Mounting
+    frames: set[str] = field(default_factory=set)
+
+    def seen(self, bundle: Bundle, detections: Detections, base: str) -> SeenImage:
+        """Detections with the view of their camera."""
+        info = self._info(bundle, detections.frame_id)
+        base_from_camera = self.mounting.lookup(bundle, base, info.frame_id or detections.frame_id)
+        velocity = np.zeros(3) if bundle.odometry is None else bundle.odometry.velocity
+        late_s = ((detections.stamp_ns or bundle.stamp_ns) - bundle.stamp_ns) / 1e9
+        return SeenImage(detections, CameraView.at(_camera(info, self.config), base_from_camera, velocity, late_s))
+
+    def _info(self, bundle: Bundle, frame_id: str) -> CameraInfo:
+        """The CameraInfo of a frame; one camera's may be of another than its images."""
+        infos = bundle.each(CAMERA_INFO)
+        if not infos:
+            raise RecordingError(
+                f"there is no {CameraInfo.ROS_TYPE} for the camera of {DETECTIONS.topic}; record the camera's, or read "
+                f"another topic as it with --remap TOPIC={CAMERA_INFO.topic}"
+            )
+        own = [info for info in infos if plain(info.frame_id) == plain(frame_id)]
+        if not own and (len(infos) > 1 or len(self.frames) > 1):
+            frames = " and ".join(info.frame_id for info in infos)
+            raise RecordingError(
+                f"no {CameraInfo.ROS_TYPE} is of the frame {frame_id!r}, which boxes on {DETECTIONS.topic} are of, but "
+                f"of {frames}; record that camera's, or choose others with --image TOPIC"
+            )
+        return (own or infos)[0]
+
+
 def _fused(
-    bundle: Bundle, objects: ScanObjects, detections: Sequence[Detections], fusers: _Fusers, mounting: Mounting
+    bundle: Bundle, objects: ScanObjects, detections: Sequence[Detections], fusers: _Fusers, cameras: _Cameras
 ) -> tuple[SceneObjects, int]:
     """The scene of a bundle, and the number of its boxes that come to nothing."""
     config, cloud = fusers.config, bundle.get(CLUSTERED_CLOUD)
     if config.method == "thesis":
-        if len(detections) > 1:
+        if len(cameras.frames) > 1:
             raise UsageError("the thesis's method has one camera; choose it with --image TOPIC")
         return fuse_in_order(objects, next(iter(detections), None), config.image_centre_px)
-    images = [SeenImage(one, _view(bundle, one, objects, mounting, config)) for one in detections]
+    images = [cameras.seen(bundle, one, objects.frame_id) for one in detections]
     odometry = None if bundle.odometry is None else bundle.odometry.odom_from_base
     if cloud is not None and cloud.stamp_ns == objects.stamp_ns:
         return fusers.clouds.add(cloud, images, odometry)
     return fusers.planar.add(objects, images, odometry)
-
-
-def _view(
-    bundle: Bundle, detections: Detections, objects: ScanObjects, mounting: Mounting, config: FuseConfig
-) -> CameraView:
-    info = _info(bundle, detections.frame_id)
-    base_from_camera = mounting.lookup(bundle, objects.frame_id, info.frame_id or detections.frame_id)
-    velocity = np.zeros(3) if bundle.odometry is None else bundle.odometry.velocity
-    late_s = ((detections.stamp_ns or bundle.stamp_ns) - bundle.stamp_ns) / 1e9
-    return CameraView.at(_camera(info, config), base_from_camera, velocity, late_s)
-
-
-def _info(bundle: Bundle, frame_id: str) -> CameraInfo:
-    """The CameraInfo of the camera of a frame: the only one, else that of the frame."""
-    infos = bundle.each(CAMERA_INFO)
-    if not infos:
-        raise RecordingError(
-            f"there is no {CameraInfo.ROS_TYPE} for the camera of {DETECTIONS.topic}; record the camera's, or read "
-            f"another topic as it with --remap TOPIC={CAMERA_INFO.topic}"
-        )
-    own = [info for info in infos if plain(info.frame_id) == plain(frame_id)]
-    if len(infos) > 1 and not own:
-        frames = ", ".join(info.frame_id for info in infos)
-        raise RecordingError(
-            f"no {CameraInfo.ROS_TYPE} is of the frame {frame_id!r}, which boxes on {DETECTIONS.topic} are of, but of "
-            f"{frames}; choose the images that they are of with --image TOPIC"
-        )
-    return (own or infos)[0]
 
 
 def _camera(info: CameraInfo, config: FuseConfig) -> CameraModel:
