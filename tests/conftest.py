@@ -1,11 +1,16 @@
 """Fixtures that every test may use."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from mcap_landmarks.networks import cache
 
 from tests.shared import data_folder
+
+NANODET = cache.folder() / "nanodet.onnx"
+"""Where the user's own cache has it, before the tests get one of their own."""
 
 # The same examples on every run and machine: a red test is a change, not luck.
 settings.register_profile("fixed", derandomize=True, deadline=None)
@@ -19,6 +24,24 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Tests on real data take minutes, so they come first: in parallel runs the others fill the time beside them."""
     items.sort(key=lambda item: "real" not in item.path.parts)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def empty_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A cache folder of the tests' own: what they find must not hang on what their user fetched."""
+    folder = tmp_path_factory.mktemp("cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("MCAP_LANDMARKS_CACHE", str(folder))
+        yield folder
+
+
+@pytest.fixture(scope="session")
+def nanodet() -> Path:
+    """NanoDet-g as the user's cache has it; tests that need it are skipped where it was not fetched."""
+    path = NANODET
+    if not path.is_file():
+        pytest.skip("NanoDet-g is not in the cache; `mcap-landmarks models get nanodet` fetches it once")
+    return path
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mcap_landmarks.errors import ToolkitError
-from mcap_landmarks.manifest import RUN, Manifest
+from mcap_landmarks.manifest import GENERATE, RUN, Manifest
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.stage import Stamped
 
@@ -54,7 +54,7 @@ def manifest(staged: Staged) -> Manifest:
     """What the recording is made from: every value of the scenario, the seed, the versions that shape its bytes."""
     versions = {name: importlib.metadata.version(name) for name in ("pybullet", "opencv-python-headless", "numpy")}
     return Manifest(
-        "generate",
+        GENERATE,
         config={"scenario": effective(staged.scenario)},
         options={"scenario": staged.name, "versions": versions},
         seed=staged.scenario.seed,

@@ -54,8 +54,8 @@ def test_what_a_declaration_says_of_channels_and_files_is_of_its_own(name: str) 
     assert not set(stage.files) & {field.name for field in dataclasses.fields(stage.config)}
     if isinstance(stage, Stage):
         assert stage.places.keys() <= set(stage.writes)
-        assert stage.bundled.keys() <= set(stage.resources)
-        assert all(bundled().is_file() for bundled in stage.bundled.values())
+        assert stage.choices.keys() <= set(stage.resources)
+        assert all(choose(None, True).path for choose in stage.choices.values())  # the generator's logs need no option
         for place in stage.places.values():
             assert get_type_hints(place).get("config", stage.config) is stage.config
         assert not stage.thinned or ROLES[stage.reads[0]].name == "image"  # the options that thin out name images

@@ -82,13 +82,15 @@ def test_its_declaration_says_where_channels_go(here: Path) -> None:
     assert run.notes == (f"no transforms beside {CAMERA_IMAGE.topic}",)
 
 
-def test_a_file_that_is_not_bundled_has_to_be_given() -> None:
+def test_a_file_that_the_stage_does_not_choose_has_to_be_given() -> None:
     stage = stages.find_stage("beacons")
     assert isinstance(stage, Stage)
-    assert load_files(stage, {}, {})[1] == {"label": TOYS / "label.txt"}
-    assert load_files(stage, {"beacons": {"label": "a"}}, {"label": Path("b")})[1] == {"label": Path("b")}
-    with pytest.raises(UsageError, match="beacons needs a label and none is bundled; give --label FILE"):
-        load_files(dataclasses.replace(stage, bundled={}), {}, {})
+    files = load_files(stage, {}, {})[1]
+    assert (files.paths, files.origins) == ({"label": TOYS / "label.txt"}, {"label": "toy"})
+    files = load_files(stage, {"beacons": {"label": "a"}}, {"label": Path("b")})[1]
+    assert (files.paths, files.origins) == ({"label": Path("b")}, {"label": "file"})
+    with pytest.raises(UsageError, match="beacons needs a label; give --label FILE"):
+        load_files(dataclasses.replace(stage, choices={}), {}, {})
 
 
 @pytest.mark.parametrize(("log", "chosen"), [("images", "beacons"), ("scans", "echoes")])

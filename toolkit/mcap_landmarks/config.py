@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from mcap_landmarks.errors import ToolkitError, UsageError
+from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location, to_read
 from mcap_landmarks.sources import find_source, source_names
 from mcap_landmarks.stage import Config, Stage
@@ -135,32 +135,34 @@ def effective(config: Config) -> dict[str, object]:
     return dataclasses.asdict(config)
 
 
+@dataclass(frozen=True, slots=True)
+class Files:
+    """The files of a stage by name, and where those come from that were chosen."""
+
+    paths: Mapping[str, Location]
+    origins: Mapping[str, str]
+
+
 def load_files(
-    stage: Stage, settings: Settings, given: Mapping[str, Location | None]
-) -> tuple[Config, dict[str, Location]]:
+    stage: Stage, settings: Settings, given: Mapping[str, Location | None], *, generated: bool = False
+) -> tuple[Config, Files]:
     """The configuration of a stage, and its files: `given` ones, else those that the settings name, such as
-    `detect.model`. Files are no part of the configuration, so that no path gets into a manifest.
+    `detect.model`, else what the stage chooses; `generated` says that the log is the generator's. Files are no part of
+    the configuration, so that no path gets into a manifest.
 
     Raises:
-        UsageError: a file that the stage cannot do without is not given.
+        UsageError: a file that the stage cannot do without is not given, and none can be chosen.
     """
     own = dict(settings.get(stage.name, {}))
     files = {name: location(str(own.pop(name))) for name in stage.files if name in own}
     files.update({name: path for name, path in given.items() if path is not None and name in stage.files})
+    chosen = {name: choose(files.get(name), generated) for name, choose in stage.choices.items()}
+    files.update({name: choice.path for name, choice in chosen.items()})
     for name in stage.resources:
         if name not in files:
-            files[name] = _bundled(stage, name)
-    return stage_config(stage.config, stage.name, own), files
-
-
-def _bundled(stage: Stage, name: str) -> Location:
-    """The file that travels with the program, where the user gives none."""
-    if name in stage.bundled:
-        with contextlib.suppress(ToolkitError):
-            return stage.bundled[name]()
-    raise UsageError(
-        f"{stage.name} needs a {name} and none is bundled; give --{name} FILE or --set {stage.name}.{name}=FILE"
-    )
+            raise UsageError(f"{stage.name} needs a {name}; give --{name} FILE or --set {stage.name}.{name}=FILE")
+    origins = {name: choice.origin for name, choice in chosen.items()}
+    return stage_config(stage.config, stage.name, own), Files(files, origins)
 
 
 def load(name: str, settings: Settings) -> Config:

@@ -15,10 +15,14 @@ from mcap_landmarks.locations import Location
 
 RUN = "mcap-landmarks.run"
 """Name of the metadata record that holds the manifest."""
+GENERATE = "generate"
+"""The verb of the generator's own recordings."""
 CONTENT = "content"
 """Entry of the manifest with a hash over the chunks that it was written beside: who edits the file breaks it."""
 LOSSES = "losses"
 """Entry of the manifest with what of the input could not be read when the output was written."""
+GENERATED = "generated"
+"""Entry of the manifest that is true where the generator made all that was sensed, so also in what was made of it."""
 CARRIED = "carried"
 """Entry of the manifest with the number of messages, by topic, from before a cut that were carried over to it."""
 STAGE = "mcap-landmarks.stage"
@@ -76,7 +80,8 @@ class StageRecord:
     `code` is a hash of the toolkit's sources, `resources` hashes by name. `inputs` names the recording by its
     fingerprint and the stages whose results were read by their keys. `options` are choices beside the configuration:
     topics, remaps, thinning. Results are the same if, and are reused only if, their keys are equal and they are whole:
-    an output of less time than its input carries older results on of which a part `is_cut` off.
+    an output of less time than its input carries older results on of which a part `is_cut` off. `origins` tells where
+    the resources come from that were chosen; the same file is the same file wherever it lay.
     """
 
     stage: str
@@ -87,6 +92,7 @@ class StageRecord:
     options: Mapping[str, object] = field(default_factory=dict)
     outcome: Outcome = field(default_factory=Outcome)
     is_cut: bool = False
+    origins: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def key(self) -> str:
@@ -132,6 +138,7 @@ class StageRecord:
             "options": dict(self.options),
             "outcome": self.outcome.entry(),
             "is_cut": self.is_cut,
+            **({"origins": dict(self.origins)} if self.origins else {}),
         }
 
 
@@ -141,6 +148,7 @@ class Manifest:
 
     `fingerprint` is that of the recording whose messages the output carries on, so that results never change it.
     `stages` are the stages whose results the output holds; their configurations and files are listed with the others.
+    `generated` says that the input is the generator's.
     """
 
     verb: str
@@ -151,6 +159,7 @@ class Manifest:
     fingerprint: str = ""
     seed: int | None = None
     stages: tuple[StageRecord, ...] = ()
+    generated: bool = False
 
     def entries(self) -> dict[str, str]:
         """The manifest as entries of a metadata record: one JSON text per key."""
@@ -165,6 +174,8 @@ class Manifest:
         }
         if self.seed is not None:
             content["seed"] = self.seed
+        if self.generated:
+            content[GENERATED] = True
         if self.fingerprint:
             content["fingerprint"] = self.fingerprint
         if self.stages:
@@ -186,6 +197,12 @@ def stage_records(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, StageR
     except (ValueError, KeyError, TypeError, AttributeError):  # of another version: nothing in it can be reused
         return {}
     return found
+
+
+def is_generated(metadata: Mapping[str, Mapping[str, str]]) -> bool:
+    """Whether the generator made a recording, or what it was made of."""
+    entries = metadata.get(RUN, {})
+    return entries.get("verb") == entry_text(GENERATE) or entries.get(GENERATED) == entry_text(True)
 
 
 def carried_fingerprint(metadata: Mapping[str, Mapping[str, str]], content: str) -> str | None:

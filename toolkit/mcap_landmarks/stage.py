@@ -235,6 +235,18 @@ Place = Callable[[InputLog, Any], str | LeftOut]
 
 
 @dataclass(frozen=True, slots=True)
+class Chosen:
+    """The file of a resource, and for the manifest where it comes from, in words without a path."""
+
+    path: Location
+    origin: str
+
+
+Choose = Callable[[Location | None, bool], Chosen]
+"""Of what the user gave for a resource, if anything, and whether the generator made the log, the file to take."""
+
+
+@dataclass(frozen=True, slots=True)
 class Stage:
     """One step of the pipeline: what it reads and writes, its configuration and its code.
 
@@ -242,8 +254,8 @@ class Stage:
     `thinned` lets --image-rate and --every leave out some of them. Channels of `reads` that are `optional`, too, are
     read where they are there, and no other stage is run to make them. A channel of `writes` gets its own topic, or the
     one that its function in `places` gives. `config` is a dataclass type. `resources` are files that the runner opens,
-    hashes and passes in, `options` files that may be missing; where the user gives none, a resource is what its
-    function in `bundled` gives, a file that travels with the program. `tolerance` says how far each field, by the name
+    hashes and passes in, `options` files that may be missing; a resource with a function in
+    `choices` is what that gives, whether the user gave one or not. `tolerance` says how far each field, by the name
     that `diff` gives it, may differ between two machines; a number is absolute.
     """
 
@@ -257,7 +269,7 @@ class Stage:
     places: Mapping[Channel[Message], Place] = field(default_factory=dict)
     resources: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
-    bundled: Mapping[str, Callable[[], Location]] = field(default_factory=dict)
+    choices: Mapping[str, Choose] = field(default_factory=dict)
     tolerance: Mapping[str, float | Tolerance] = field(default_factory=dict)
 
     @property

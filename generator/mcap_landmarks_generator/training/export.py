@@ -7,9 +7,9 @@ from pathlib import Path
 
 import onnx
 import torch
+from mcap_landmarks.coco import NAMES
 from torch import nn
 
-from mcap_landmarks_generator.training.coco import NAMES
 from mcap_landmarks_generator.training.examples import CLASS_IDS
 from mcap_landmarks_generator.training.network import STRIDES_PX, Convolution, Decoded, Network
 

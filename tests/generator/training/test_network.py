@@ -8,11 +8,11 @@ import pytest
 torch = pytest.importorskip("torch")
 onnx = pytest.importorskip("onnx")
 import onnxruntime  # noqa: E402 - after what may skip
+from mcap_landmarks.coco import NAMES  # noqa: E402
 from mcap_landmarks.vision.config import DetectConfig  # noqa: E402
 from mcap_landmarks.vision.detector import read_detector  # noqa: E402
 from mcap_landmarks.vision.onnx_session import open_session  # noqa: E402
 from mcap_landmarks_generator.training import fitting  # noqa: E402
-from mcap_landmarks_generator.training.coco import NAMES  # noqa: E402
 from mcap_landmarks_generator.training.examples import CLASS_IDS, Batch, Phase  # noqa: E402
 from mcap_landmarks_generator.training.export import export, fused, with_all_classes  # noqa: E402
 from mcap_landmarks_generator.training.loss import complete_iou, loss  # noqa: E402

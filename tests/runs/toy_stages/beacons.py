@@ -7,10 +7,11 @@ from typing import Literal
 
 import numpy as np
 from mcap_landmarks.channels import CAMERA_IMAGE, SCENE_MARKERS, SCENE_OBJECTS, TF
+from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.markers import MarkerArray
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage
-from mcap_landmarks.stage import Bundle, InputLog, LeftOut, Omission, Stage, Stamped
+from mcap_landmarks.stage import Bundle, Chosen, InputLog, LeftOut, Omission, Stage, Stamped
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +44,9 @@ def _not_here(log: InputLog, _config: BeaconsConfig) -> LeftOut:
     return LeftOut(f"no transforms beside {log.primary.topic}")
 
 
-def _label() -> Path:
-    return Path(__file__).with_name("label.txt")
+def _label(asked: Location | None, generated: bool) -> Chosen:
+    del generated
+    return Chosen(Path(__file__).with_name("label.txt"), "toy") if asked is None else Chosen(asked, "file")
 
 
 STAGE = Stage(
@@ -56,5 +58,5 @@ STAGE = Stage(
     thinned=True,
     places={SCENE_MARKERS: _beside_images, TF: _not_here},
     resources=("label",),
-    bundled={"label": _label},
+    choices={"label": _label},
 )

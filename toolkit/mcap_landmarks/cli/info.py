@@ -62,6 +62,7 @@ def _document(log: "LogInfo") -> dict[str, object]:
         "missing": log.missing,
         "losses": list(log.losses),
         **({} if log.findings is None else {"findings": [dataclasses.asdict(finding) for finding in log.findings]}),
+        **({} if log.findings is None else {"network": log.network}),
     }
 
 
@@ -106,6 +107,8 @@ def _print_verbs(log: "LogInfo") -> None:
 
 
 def _print_findings(log: "LogInfo") -> None:
+    if log.network is not None:
+        say(f"network for its images: {log.network}")
     for finding in log.findings or ():
         about = f"{finding.topic}: " if finding.topic else ""
         say(f"{finding.level}: {about}{finding.text}; {finding.remedy}")

@@ -65,7 +65,16 @@ Every = Annotated[
     str | None,
     typer.Option("--every", metavar="0.2m,5deg", help="Leave out images until the robot moved or turned so far."),
 ]
-Model = Annotated[Location | None, typer.Option("--model", parser=location, help="Detector: any YOLOv5 export (ONNX).")]
+Model = Annotated[
+    Location | None,
+    typer.Option(
+        "--model",
+        metavar="FILE|NAME",
+        parser=location,
+        help="Detector: an export (ONNX), `bundled`, or one of `models list`. Default: the bundled one for logs of the "
+        "generator, else the one that `models get` fetched.",
+    ),
+]
 Names = Annotated[
     Location | None,
     typer.Option("--names", parser=location, help="Class names, one per line, where the model has none."),

@@ -7,11 +7,14 @@ from pathlib import Path
 
 from mcap_landmarks.channels import MAP_POSE, MATCH, POSE, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
 from mcap_landmarks.config import Settings
+from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.inspection.checks import Finding, check
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog, open_logs
 from mcap_landmarks.inspection.survey import survey
 from mcap_landmarks.inspection.topic_roles import ROLES, could_be, topics_for
 from mcap_landmarks.locations import Location
+from mcap_landmarks.manifest import is_generated
+from mcap_landmarks.networks.choice import choose_network
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.sources import Log
 from mcap_landmarks.stage import Watch
@@ -47,7 +50,8 @@ class ChannelInfo:
 class LogInfo:
     """One log. `name` tells the logs of one path apart, `roles` are topics by role, `missing` roles by verb.
 
-    `hints` tells for roles that are missing which topics could play them, and how to choose one.
+    `hints` tells for roles that are missing which topics could play them, and how to choose one. `network` is the one
+    that would look at its images, None where it has none or no network fits; it is told with the findings.
     """
 
     path: Path
@@ -62,6 +66,7 @@ class LogInfo:
     hints: Mapping[str, str]
     losses: tuple[str, ...] = field(default=())
     findings: tuple[Finding, ...] | None = None
+    network: str | None = None
 
 
 def describe(place: Location, settings: Settings, watch: Watch | None = None) -> list[LogInfo]:
@@ -82,9 +87,20 @@ def describe(place: Location, settings: Settings, watch: Watch | None = None) ->
                 described.append(_describe(log, _profile(log), log.parts, losses))
             if watch is not None:
                 with watch(f"check {log.name}", log.size_bytes) as progress:
-                    findings = check(survey(log, described[-1].roles, progress))
-                described[-1] = replace(described[-1], findings=tuple(findings))
+                    found = survey(log, described[-1].roles, progress)
+                network, about_it = _network(log) if found.of("image") else (None, [])
+                described[-1] = replace(described[-1], findings=(*about_it, *check(found)), network=network)
         return described
+
+
+def _network(log: OpenLog) -> tuple[str | None, list[Finding]]:
+    """The network that would look at a log's images, and what is wrong where there is none."""
+    generated = all(isinstance(part, McapLog) and is_generated(part.metadata) for part in log.parts)
+    try:
+        return choose_network(None, generated).origin, []
+    except ToolkitError as error:
+        text, _, remedy = str(error).partition("; ")
+        return None, [Finding("problem", "network", "", text, remedy)]
 
 
 def _profile(log: OpenLog) -> str:

@@ -11,7 +11,7 @@ from pathlib import Path
 from mcap_landmarks.config import effective
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog
-from mcap_landmarks.manifest import CARRIED, RUN, Manifest, entry_text
+from mcap_landmarks.manifest import CARRIED, RUN, Manifest, entry_text, is_generated
 from mcap_landmarks.messages.qos import KEY
 from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.writer import create_recording
@@ -175,6 +175,7 @@ class Job:
             config={log.source: effective(log.config) for log in self._logs},
             inputs=tuple(hashes[log.path] for log in self._logs),
             options=self._selection.options(),
+            generated=all(isinstance(part, McapLog) and is_generated(part.metadata) for part in self._parts),
         )
         return {**carried, RUN: manifest.entries()}
 

@@ -14,6 +14,7 @@ from mcap_landmarks.manifest import (
     STAGE,
     Manifest,
     entry_text,
+    is_generated,
     narrowed,
     told_carried,
     told_losses,
@@ -45,7 +46,14 @@ def write_output(
         for layer in results
         if layer.record is not None
     )
-    manifest = Manifest(verb, inputs=tuple(inputs), options=request.options(), fingerprint=fingerprint, stages=records)
+    manifest = Manifest(
+        verb,
+        inputs=tuple(inputs),
+        options=request.options(),
+        fingerprint=fingerprint,
+        stages=records,
+        generated=is_generated(source.metadata),
+    )
     metadata = {**source.metadata, RUN: manifest.entries()}
     own = _own(session, results)
     earlier = session.earlier

@@ -4,13 +4,13 @@ CONTRIBUTING.md follows a setting from the command line through `plan` to its st
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 from mcap_landmarks.channels import ODOMETRY, RESULTS
 from mcap_landmarks.config import Settings, effective, load_files
 from mcap_landmarks.inspection.topic_roles import ROLES, Choice
 from mcap_landmarks.locations import Location
-from mcap_landmarks.manifest import RECORDING, StageRecord, code_hash, file_hash
+from mcap_landmarks.manifest import RECORDING, StageRecord, code_hash, file_hash, is_generated
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.runs.bundles import Span
 from mcap_landmarks.runs.recorded_log import RecordedLog
@@ -68,12 +68,14 @@ def plan(request: Request, log: RecordedLog, names: Sequence[str]) -> list[Step]
         ToolkitError: a file cannot be read.
     """
     steps: list[Step] = []
+    generated = is_generated(log.recording.metadata)
     for name in names:
         stage = find_stage(name)
         assert isinstance(stage, Stage)  # noqa: S101 - `needed_stages` gives no others
-        config, files = load_files(stage, request.settings, request.files)
-        inputs = inputs_of_stage(stage, log, steps)
-        steps.append(Step(stage, config, files, record_of(stage, config, files, inputs, _options(stage, request))))
+        config, files = load_files(stage, request.settings, request.files, generated=generated)
+        inputs, options = inputs_of_stage(stage, log, steps), _options(stage, request)
+        record = replace(record_of(stage, config, files.paths, inputs, options), origins=files.origins)
+        steps.append(Step(stage, config, files.paths, record))
     return steps
 
 

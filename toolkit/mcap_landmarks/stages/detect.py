@@ -12,7 +12,7 @@ from mcap_landmarks.errors import MessageError, RecordingError, UsageError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CompressedImage, Image
-from mcap_landmarks.resources import detector
+from mcap_landmarks.networks.choice import choose_network
 from mcap_landmarks.stage import Bundle, Omission, Stage, Stamped
 from mcap_landmarks.vision.annotations import annotations
 from mcap_landmarks.vision.classifier import Classifier, open_classifier
@@ -125,6 +125,6 @@ STAGE = Stage(
     places={ANNOTATIONS: annotations_topic},
     resources=("model",),
     options=("names", "classifier"),
-    bundled={"model": detector},
+    choices={"model": choose_network},
     tolerance={"box_xyxy_px": 0.5, "score": 1e-4, "others.score": 1e-4, "points.points": 0.5, "texts.position": 0.5},
 )
