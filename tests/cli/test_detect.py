@@ -184,7 +184,7 @@ def test_many_logs(tmp_path: Path, model: Path, capsys: pytest.CaptureFixture[st
 
 def test_without_a_model_the_bundled_one_looks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, out = write(tmp_path / "log.mcap", images()), tmp_path / "out.mcap"
-    assert call("detect", log, "-o", out, "--json") == 0
+    assert call("detect", log, "-o", out, "--model", "bundled", "--json") == 0
     assert json.loads(capsys.readouterr().out)["images"] > 0
     assert call("detect", log, "-o", out, "--set", "detect.classes=['unicorn']") == 2
     assert "detector.onnx detects no unicorn" in capsys.readouterr().err

