@@ -182,11 +182,11 @@ def test_many_logs(tmp_path: Path, model: Path, capsys: pytest.CaptureFixture[st
     assert len(document["logs"]) == 2
 
 
-def test_without_a_model_the_bundled_one_looks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_bundled_one_looks_at_any_log_where_one_insists(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, out = write(tmp_path / "log.mcap", images()), tmp_path / "out.mcap"
     assert call("detect", log, "-o", out, "--model", "bundled", "--json") == 0
     assert json.loads(capsys.readouterr().out)["images"] > 0
-    assert call("detect", log, "-o", out, "--set", "detect.classes=['unicorn']") == 2
+    assert call("detect", log, "-o", out, "--model", "bundled", "--set", "detect.classes=['unicorn']") == 2
     assert "detector.onnx detects no unicorn" in capsys.readouterr().err
 
 

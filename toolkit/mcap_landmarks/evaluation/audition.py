@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mcap_landmarks.lidar.beams import sweep
 from mcap_landmarks.lidar.clustering import cluster, shapes_of
 from mcap_landmarks.lidar.config import ClusterConfig
+from mcap_landmarks.lidar.objects import Hypotheses
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.scan import LaserScan
 
@@ -97,8 +98,14 @@ def hear(
     config = ClusterConfig()
     things = cluster(sweep(angles_rad, ranges_m, base_from_lidar), shapes_of(config), config)
     there = [one for one in things if np.hypot(*(one.positions_xy[0] - [distance_m, 0.0])) < _NEAR_M]
-    fits = len(there) == 1 and class_name in there[0].names
+    fits = len(there) == 1 and _explained(there[0], class_name)
     return Heard(distance_m, yaw_deg, name, score, int(np.isfinite(ranges_m).sum()), fits)
+
+
+def _explained(one: Hypotheses, class_name: str) -> bool:
+    """Whether the shapes of a class explain what the LiDAR found better than a bare surface does, which stands last."""
+    shares = dict(zip(one.names, one.shares.tolist(), strict=True))
+    return bool(shares.get(class_name, 0.0) > one.shares[-1])
 
 
 def distances_of(auditions: Sequence[Audition]) -> list[float]:

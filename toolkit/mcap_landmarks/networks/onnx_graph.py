@@ -15,7 +15,7 @@ from mcap_landmarks.networks.tfjs import Weight
 NHWC, NCHW = (0, 1, 2, 3), (0, 2, 3, 1)
 """Orders of a tensor of images: as TensorFlow has them, and where ONNX's tensor has the channels second."""
 _OPSET, _IR_VERSION = 18, 10
-"""The first with `axes` of Resize, and the newest that onnxruntime 1.20 reads."""
+"""As PyTorch's exporter has them today, and both known to onnxruntime 1.20."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from mcap_landmarks.errors import ModelError
-from mcap_landmarks.networks.onnx_graph import NCHW, OnnxGraph, Value
+from mcap_landmarks.networks.onnx_graph import NCHW, OnnxAttribute, OnnxGraph, Value
 from mcap_landmarks.networks.tfjs import Attribute, TfGraph, TfNode, Weight
 
 _A = TypeVar("_A", str, float, tuple[int, ...])
@@ -152,11 +152,21 @@ def _convolved(call: Call, filters: Weight, groups: int, *bias: str) -> Value:
         *(image, call.made.constant(filters), *bias),
         kernel_shape=filters.shape[2:],
         strides=_sides(call, "strides"),
-        dilations=_sides(call, "dilations"),
-        auto_pad=_padding(call),
         group=groups,
+        **_spread(call, filters.shape[2:]),
     )
     return Value(name, NCHW)
+
+
+def _spread(call: Call, kernel: Sequence[int]) -> dict[str, OnnxAttribute]:
+    """The padding and dilation of a convolution; onnxruntime does not pad dilated ones by itself."""
+    padding, dilations = _padding(call), _sides(call, "dilations")
+    if padding == "VALID" or set(dilations) == {1}:
+        return {"dilations": dilations, "auto_pad": padding}
+    if set(_sides(call, "strides")) != {1}:
+        raise call.refused("it is dilated, strided and padded at once")
+    zeros = [(side - 1) * dilation for side, dilation in zip(kernel, dilations, strict=True)]
+    return {"dilations": dilations, "pads": [*(n // 2 for n in zeros), *(n - n // 2 for n in zeros)]}
 
 
 def _max_pool(call: Call) -> Iterator[Tensor]:
@@ -195,8 +205,10 @@ def _resize(call: Call) -> Iterator[Tensor]:
         # What lies between two pixels goes to the later one where TensorFlow rounds or counts from centres.
         "nearest_mode": "round_prefer_ceil" if corners or half else "floor",
     }
-    size = call.made.constant(call.whole(1))
-    yield Value(call.made.node("Resize", _image(call), "", "", size, axes=[2, 3], **modes), NCHW)
+    image, size = _image(call), call.made.constant(call.whole(1))
+    # With `axes` in place of whole sizes, onnxruntime 1.31 loses the sizes where it moves a transposition.
+    whole = call.made.node("Concat", call.made.node("Shape", image, start=0, end=2), size, axis=0)
+    yield Value(call.made.node("Resize", image, "", "", whole, **modes), NCHW)
 
 
 def _concat(call: Call) -> Iterator[Tensor]:

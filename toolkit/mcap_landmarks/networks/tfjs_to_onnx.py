@@ -68,6 +68,4 @@ def _converted(
         yield from OPERATIONS[node.op](Call(node, reads, graph, made))
     else:
         known = ", ".join(sorted(OPERATIONS))
-        raise ModelError(
-            f"{graph.what}: {node.name} is of the operation {node.op}, which cannot be converted; {known} can"
-        )
+        raise ModelError(f"{graph.what}: {node.name} is a {node.op}, which cannot be converted; there are {known}")

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.evaluation.audition import Audition, Heard
+from mcap_landmarks.evaluation.audition import Audition, Heard, distances_of
 from mcap_landmarks.vision.pixels import Rgb
 
 _CELL_PX = 128
@@ -40,18 +40,18 @@ def sheet(auditions: Sequence[Audition], cells: Sequence[Sequence[Cell]]) -> Rgb
 
     Their frames are green where it was recognised, orange where taken for another class, red where missed.
     """
-    widest = max(cells, key=lambda row: len(row))
-    width = _NAME_PX + len(widest) * _CELL_PX
+    lefts = {distance_m: _NAME_PX + i * _CELL_PX for i, distance_m in enumerate(distances_of(auditions))}
+    width = _NAME_PX + len(lefts) * _CELL_PX
     head = np.full((_HEAD_PX, width, 3), 255, np.uint8)
-    for i, cell in enumerate(widest):
-        _write(head, f"{cell.heard.distance_m:g} m", (_NAME_PX + i * _CELL_PX + _FRAME_PX, _HEAD_PX - 8))
+    for distance_m, left in lefts.items():
+        _write(head, f"{distance_m:g} m", (left + _FRAME_PX, _HEAD_PX - 8))
     rows = [head]
     for audition, row in zip(auditions, cells, strict=True):
         picture = np.full((_CELL_PX + 2 * _LINE_PX, width, 3), 255, np.uint8)
         _write(picture, audition.class_name, (4, _LINE_PX))
         _write(picture, audition.variant, (4, 2 * _LINE_PX))
-        for i, cell in enumerate(row):
-            left = _NAME_PX + i * _CELL_PX
+        for cell in row:
+            left = lefts[cell.heard.distance_m]
             picture[:_CELL_PX, left : left + _CELL_PX] = _framed(cell, audition.class_name)
             found = f"{cell.heard.found} {cell.heard.score:.2f}" if cell.heard.found else "nothing"
             _write(picture, found, (left + _FRAME_PX, _CELL_PX + _LINE_PX - 4))

@@ -14,19 +14,19 @@ from mcap_landmarks.vision.annotations import annotations
 from mcap_landmarks.vision.pixels import Rgb
 
 _FORMATS = (".png", ".jpg", ".jpeg")
-_TEXT_PX = 22
-"""The height of OpenCV's font at scale 1."""
+_TEXT_PX, _USUAL_PX = 22, 800
+"""The height of OpenCV's font at scale 1, and up to which side of an image a label keeps the size that it has."""
 
 
 def with_boxes(rgb: Rgb, detections: Detections) -> Rgb:
     """A copy of an image with a box and a label for every detection, in the colours that `detect` gives classes."""
     image, drawn = rgb.copy(), annotations(detections)
-    thickness = max(1, round(max(rgb.shape) / 500))
+    larger = max(1.0, max(rgb.shape) / _USUAL_PX)
     for outline in drawn.outlines:
         pixels = np.rint(outline.pixels_uv).astype(np.int32)
-        cv2.polylines(image, [pixels], True, _grey_levels(outline.color), thickness, cv2.LINE_AA)
+        cv2.polylines(image, [pixels], True, _grey_levels(outline.color), round(larger), cv2.LINE_AA)
     for label in drawn.labels:
-        scale = thickness * label.size_px / _TEXT_PX
+        scale = larger * label.size_px / _TEXT_PX
         (width, height), below = cv2.getTextSize(label.text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)
         left = int(min(label.pixel_uv[0], max(0, rgb.shape[1] - width)))
         bottom = int(max(label.pixel_uv[1], height + below))
