@@ -9,6 +9,7 @@ from typing import get_args
 import pytest
 from mcap_landmarks.cli.main import build, verbs
 from mcap_landmarks.locations import Location, location
+from mcap_landmarks.resources import resource
 
 from tests.cli.calls import call, refused
 from tests.cli.logs import messages, write
@@ -34,12 +35,18 @@ LINES = {
     "--config {config_file}",
     "map": "map {logs} -o {output} --map {map_file} --prior {prior} --model {model} --extrinsics {extrinsics} "
     "--config {config_file}",
+    "models audition": "models audition {model} -o {output} --classes suitcase --names {names}",
+    "models check": "models check {model} -o {output} --image {images} --names {names}",
+    "models get": "models get nanodet --from {archive}",
     "plot": "plot {inputs} -o {output}",
     "run": "run {logs} -o {output} --stages detect,cluster,fuse,localize --map {map_file} --model {model} "
     "--names {names} --extrinsics {extrinsics} --config {config_file}",
 }
 """Every verb with every place where it takes a file, by the name of its parameter."""
-ENDINGS = {"explain": "png", "plot": "png", "landmarks import": "json", "landmarks export": "json"}
+ENDINGS = {
+    **dict.fromkeys(("explain", "plot", "models check", "models audition"), "png"),
+    **dict.fromkeys(("landmarks import", "landmarks export"), "json"),
+}
 EACH = [(verb, name) for verb, line in LINES.items() for name in re.findall(r"{(\w+)}", line)]
 
 
@@ -70,6 +77,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
         "candidate": scenes,
         "model": two_posts(folder / "model.onnx"),
         "names": folder / "names.txt",
+        "images": resource("recordings", "demo.png"),
         "config_file": folder / "config.toml",
         "extrinsics": folder / "extrinsics.json",
         "file": folder / "map.json",
@@ -87,8 +95,12 @@ def test_every_file_of_every_verb_is_a_location() -> None:
 
 
 def _types(parameter: inspect.Parameter) -> tuple[object, ...]:
-    written = get_args(parameter.annotation)[0]
-    return (written, *get_args(written))
+    return _parts(get_args(parameter.annotation)[0])
+
+
+def _parts(written: object) -> tuple[object, ...]:
+    """A type and all that it is made of."""
+    return (written, *(part for inner in get_args(written) for part in _parts(inner)))
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """List, fetch and try out the networks that detect."""
 
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,7 +12,8 @@ from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
     from mcap_landmarks.evaluation.audition import Audition
-    from mcap_landmarks.networks.trial import Trial
+    from mcap_landmarks.messages.detections import Detections
+    from mcap_landmarks.networks.trial import Speed, Trial
     from mcap_landmarks.report.audition_sheet import Cell
 
 app = typer.Typer(no_args_is_help=True, help=__doc__)
@@ -95,7 +97,7 @@ def check(
 
     Without --image it looks at an image of the demo. --set takes the settings of `detect`, such as detect.confidence.
     """
-    from mcap_landmarks.report.boxes import check_picture, column, with_boxes, write_picture
+    from mcap_landmarks.report.box_pictures import check_picture, column, with_boxes, write_picture
     from mcap_landmarks.runs.pictures import DEMO, demo_picture, read_picture
 
     if output is not None:
@@ -106,21 +108,10 @@ def check(
     if output is not None:
         write_picture(output, column([with_boxes(rgb, found[name]) for name, rgb in pictures.items()]))
     speeds = trial.speeds(next(iter(pictures.values())))
-    boxes = [
-        {"image": name, "class": options[0][0], "score": float(options[0][1]), "box_px": box}
-        for name, detections in found.items()
-        for options, box in zip(detections.hypotheses, detections.boxes_xyxy.tolist(), strict=True)
-    ]
     if json:
-        timed = [{"threads": one.threads, "input_px": one.input_px, "ms": one.ms} for one in speeds]
-        say_json("models_check", {**_about(trial), "speeds": timed, "images": list(pictures), "detections": boxes})
-        return
-    _print_about(trial)
-    for one in speeds:
-        size = " x ".join(map(str, one.input_px[::-1]))
-        say(f"speed: {one.ms:.1f} ms an image of {size} on {one.threads} thread{'s' if one.threads > 1 else ''}")
-    rows = [[str(box["image"]), str(box["class"]), f"{box['score']:.2f}", _pixels(box["box_px"])] for box in boxes]
-    table(["image", "class", "score", "left, top, right, bottom"], rows)
+        say_json("models_check", _checked(trial, speeds, found))
+    else:
+        _print_checked(trial, speeds, found)
 
 
 @app.command()
@@ -143,7 +134,7 @@ def audition(
     A table, and with -o a contact sheet. This is how the thesis chose the objects of its world (Appendix A).
     """
     from mcap_landmarks.report.audition_sheet import sheet
-    from mcap_landmarks.report.boxes import check_picture, write_picture
+    from mcap_landmarks.report.box_pictures import check_picture, write_picture
 
     if output is not None:
         check_picture(output)
@@ -172,7 +163,7 @@ def _trial(model: Location, names: Location | None, settings: list[str] | None) 
     return Trial(files.paths["model"], files.paths.get("names"), config)
 
 
-def _about(trial: "Trial") -> dict[str, object]:
+def _checked(trial: "Trial", speeds: "list[Speed]", found: "Mapping[str, Detections]") -> dict[str, object]:
     from mcap_landmarks.locations import size_of
 
     detector = trial.detector
@@ -183,10 +174,23 @@ def _about(trial: "Trial") -> dict[str, object]:
         "input": str(detector.session.inputs[0]),
         "outputs": [str(output) for output in detector.session.outputs],
         "classes": list(detector.names),
+        "speeds": [{"threads": one.threads, "input_px": one.input_px, "ms": one.ms} for one in speeds],
+        "images": list(found),
+        "detections": [
+            {"image": image, "class": name, "score": score, "box_px": box} for image, name, score, box in _boxes(found)
+        ],
     }
 
 
-def _print_about(trial: "Trial") -> None:
+def _boxes(found: "Mapping[str, Detections]") -> "Iterator[tuple[str, str, float, list[float]]]":
+    """Image, class, score and sides of every box."""
+    for image, detections in found.items():
+        for options, box in zip(detections.hypotheses, detections.boxes_xyxy.tolist(), strict=True):
+            name, score = options[0]
+            yield image, name, float(score), box
+
+
+def _print_checked(trial: "Trial", speeds: "list[Speed]", found: "Mapping[str, Detections]") -> None:
     from mcap_landmarks.locations import size_of
 
     detector = trial.detector
@@ -194,10 +198,14 @@ def _print_about(trial: "Trial") -> None:
     say(f"{len(detector.names)} classes: {', '.join(detector.names)}")
     say(f"input: {detector.session.inputs[0]}")
     say(f"outputs: {', '.join(map(str, detector.session.outputs))}")
-
-
-def _pixels(box: list[float]) -> str:
-    return ", ".join(f"{side:.0f}" for side in box)
+    for one in speeds:
+        size = " x ".join(map(str, one.input_px[::-1]))
+        say(f"speed: {one.ms:.1f} ms an image of {size} on {one.threads} thread{'s' if one.threads > 1 else ''}")
+    rows = [
+        [image, name, f"{score:.2f}", ", ".join(f"{side:.0f}" for side in box)]
+        for image, name, score, box in _boxes(found)
+    ]
+    table(["image", "class", "score", "left, top, right, bottom"], rows)
 
 
 def _audition(trial: "Trial", classes: list[str], seed: int) -> "tuple[list[Audition], list[list[Cell]]]":

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.messages.detections import Detections
-from mcap_landmarks.report.boxes import check_picture, column, with_boxes, write_picture
+from mcap_landmarks.report.box_pictures import check_picture, column, with_boxes, write_picture
 
 DARK = np.full((100, 200, 3), 40, np.uint8)
 
