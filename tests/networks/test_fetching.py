@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_landmarks.coco import NAMES
 from mcap_landmarks.errors import ModelError
 from mcap_landmarks.networks.cache import cached, folder
 from mcap_landmarks.networks.fetching import fetch
@@ -15,7 +16,7 @@ from mcap_landmarks.networks.npm_package import NpmPackage
 from mcap_landmarks.networks.trial import Trial
 from mcap_landmarks.runs.pictures import read_picture
 from mcap_landmarks.vision.config import DetectConfig
-from mcap_landmarks.vision.metadata import names_of
+from mcap_landmarks.vision.metadata import confidence_of, names_of
 from mcap_landmarks.vision.onnx_session import open_session
 
 from tests.networks.test_npm_package import archive, entry, ignore
@@ -48,6 +49,7 @@ def test_a_network_is_converted_and_kept_with_its_licence(
     session = open_session(fetched.path)
     assert session.run(np.array([[10.0, 20.0]], np.float32))[0].tolist() == [[11.0, 22.0]]
     assert (len(names_of(session, None)), session.metadata["family"]) == (80, "nanodet")
+    assert confidence_of(session, names_of(session, None)) == dict.fromkeys(NAMES, 0.35)
     assert session.metadata["license"] == NANODET.terms
     assert session.metadata["source"] == f"{NANODET.model} in the npm package a@1"
     once = fetched.path.read_bytes()

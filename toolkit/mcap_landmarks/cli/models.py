@@ -185,8 +185,8 @@ def _checked(trial: "Trial", speeds: "list[Speed]", found: "Mapping[str, Detecti
 def _boxes(found: "Mapping[str, Detections]") -> "Iterator[tuple[str, str, float, list[float]]]":
     """Image, class, score and sides of every box."""
     for image, detections in found.items():
-        for options, box in zip(detections.hypotheses, detections.boxes_xyxy.tolist(), strict=True):
-            name, score = options[0]
+        for hypotheses, box in zip(detections.hypotheses, detections.boxes_xyxy.tolist(), strict=True):
+            name, score = hypotheses[0]
             yield image, name, float(score), box
 
 

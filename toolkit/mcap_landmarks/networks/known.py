@@ -16,7 +16,8 @@ class KnownNetwork:
     """A TensorFlow.js graph in an npm package.
 
     `model`, `weights` and `licence` are paths in the package; `inputs` and `outputs` are what the ONNX file calls those
-    of the graph. `family` is the detector family (`vision.families`), `terms` tells the licence in a line.
+    of the graph. `family` is the detector family (`vision.families`), `terms` tells the licence in a line. Scores must
+    be above `confidence`, unless the user sets another.
     """
 
     name: str
@@ -29,6 +30,7 @@ class KnownNetwork:
     terms: str
     inputs: Mapping[str, str]
     outputs: Mapping[str, str]
+    confidence: float
 
     @property
     def source(self) -> str:
@@ -39,6 +41,7 @@ class KnownNetwork:
         """The metadata of the ONNX file."""
         return {
             "names": str(dict(enumerate(NAMES))),
+            "confidence": str(self.confidence),
             "family": self.family,
             "description": self.title,
             "license": self.terms,
@@ -71,6 +74,9 @@ _NANODET = KnownNetwork(
         **{f"Identity{end}": f"cls_pred_stride_{stride}" for end, stride in (("", 8), ("_1", 16), ("_2", 32))},
         **{f"Identity{end}": f"dis_pred_stride_{stride}" for end, stride in (("_3", 8), ("_4", 16), ("_5", 32))},
     },
+    # NanoDet's own demo (demo/demo.py). On 22 development frames of KITTI precision is 0.80 there and 0.57 at 0.25, with
+    # 99 and 109 of 178 labelled objects found.
+    confidence=0.35,
 )
 KNOWN: Mapping[str, KnownNetwork] = {network.name: network for network in (_NANODET,)}
 """Every network that `models get` can fetch, by name."""
