@@ -1,6 +1,7 @@
 """The verb models, and the network that other verbs take."""
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -49,6 +50,16 @@ def test_a_network_is_only_taken_as_it_is_known(tmp_path: Path, capsys: pytest.C
     other = archive(tmp_path / "other.tgz", [(entry(KNOWN["nanodet"].model, 2), b"{}")])
     assert "has the SHA-256" in refused(capsys, 1, "models", "get", "nanodet", "--from", other)
     assert "there are nanodet" in refused(capsys, 2, "models", "get", "yolov9", "--from", other)
+
+
+def test_without_the_extra_its_name_is_told(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [name for name in sys.modules if name.startswith("mcap_landmarks.networks.")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    said = refused(capsys, 1, "models", "get", "nanodet", "--from", "nowhere.tgz")
+    assert said == "error: onnx is not installed: pip install 'mcap-landmarks[models]'"
 
 
 def test_a_network_is_checked_on_an_image_of_the_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -48,6 +48,8 @@ def test_a_view_tells_what_network_and_lidar_see() -> None:
     assert heard.fits
     bench = hear((4.0, 90), found, boxes(("bench", 1.0, (10, 10, 30, 50))), scan_of_disc(4.1, 0.15), np.zeros(3))
     assert not bench.fits
+    person = boxes(("person", 1.0, (10, 10, 30, 50)))  # several shapes are of this class, and each has a share
+    assert hear((4.0, 90), found, person, scan_of_disc(4.1, 0.25), np.zeros(3)).fits
     nothing = hear((9.0, 0), boxes(), truth, scan_of_disc(4.1, 0.15), np.zeros(3))
     assert (nothing.found, nothing.fits) == ("", False)
 

@@ -104,8 +104,8 @@ def hear(
 
 def _explained(one: Hypotheses, class_name: str) -> bool:
     """Whether the shapes of a class explain what the LiDAR found better than a bare surface does, which stands last."""
-    shares = dict(zip(one.names, one.shares.tolist(), strict=True))
-    return bool(shares.get(class_name, 0.0) > one.shares[-1])
+    share = sum(share for name, share in zip(one.names, one.shares.tolist(), strict=True) if name == class_name)
+    return bool(share > one.shares[-1])
 
 
 def distances_of(auditions: Sequence[Audition]) -> list[float]:
