@@ -35,6 +35,16 @@ def empty_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
+@pytest.fixture
+def cached_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache that has a network, which is none: images of others' cameras have one to look at them."""
+    models = tmp_path / "cache" / "models"
+    models.mkdir(parents=True)
+    (models / "nanodet.onnx").touch()
+    monkeypatch.setenv("MCAP_LANDMARKS_CACHE", str(models.parent))
+    return models
+
+
 @pytest.fixture(scope="session")
 def nanodet() -> Path:
     """NanoDet-g as the user's cache has it; tests that need it are skipped where it was not fetched."""

@@ -146,15 +146,6 @@ def test_scene_objects_can_be_made(tmp_path: Path, capsys: pytest.CaptureFixture
     assert found["verbs"] == ["detect", "cluster", "map", "localize"]
 
 
-@pytest.fixture
-def fetched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A cache with a network, so that images of others have one."""
-    models = tmp_path / "cache" / "models"
-    models.mkdir(parents=True)
-    (models / "nanodet.onnx").touch()
-    monkeypatch.setenv("MCAP_LANDMARKS_CACHE", str(models.parent))
-
-
 def test_the_network_for_the_images_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
 ) -> None:
@@ -165,7 +156,7 @@ def test_the_network_for_the_images_is_told(
     assert "the bundled network knows rendered objects only" in finding["text"]
     assert finding["remedy"].startswith("get a real network once with `mcap-landmarks models get nanodet`, or give one")
     assert document(capsys, demo, "--check")["network"] == "bundled"
-    request.getfixturevalue("fetched")
+    request.getfixturevalue("cached_network")
     found = document(capsys, log, "--check")
     assert (found["findings"], found["network"]) == ([], "nanodet")
     assert run(log, "--check") == DONE
@@ -174,7 +165,7 @@ def test_the_network_for_the_images_is_told(
     assert document(capsys, write_log(tmp_path / "blind.mcap"), "--check")["network"] is None
 
 
-@pytest.mark.usefixtures("fetched")
+@pytest.mark.usefixtures("cached_network")
 def test_a_good_log_has_no_findings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = raw_log(tmp_path / "log.mcap")
     assert document(capsys, log, "--check")["findings"] == []
@@ -182,7 +173,7 @@ def test_a_good_log_has_no_findings(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "nothing was found that costs results" in capsys.readouterr().out
 
 
-@pytest.mark.usefixtures("fetched")
+@pytest.mark.usefixtures("cached_network")
 def test_findings_are_told_with_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     content = [stamped for stamped in raw_messages() if stamped.channel not in {TF_STATIC, ODOMETRY}]
     log = write(tmp_path / "log.mcap", content)

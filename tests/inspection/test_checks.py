@@ -22,6 +22,9 @@ COUNT = 40
 Change = Callable[[Stamped], Stamped | None]
 
 
+pytestmark = pytest.mark.usefixtures("cached_network")
+
+
 def findings(tmp_path: Path, change: Change, second: bool = False) -> list[Finding]:
     """What is found in a changed log, which may have a second camera without a CameraInfo."""
     content = [changed for stamped in raw_messages(COUNT) if (changed := change(stamped)) is not None]

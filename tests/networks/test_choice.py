@@ -11,41 +11,36 @@ from mcap_landmarks.resources import detector
 from mcap_landmarks.stage import Chosen
 
 
-@pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A cache that has one network."""
-    monkeypatch.setenv("MCAP_LANDMARKS_CACHE", str(tmp_path / "cache"))
-    models = tmp_path / "cache" / "models"
-    models.mkdir(parents=True)
-    (models / "nanodet.onnx").touch()
-    (models / "nanodet.LICENSE").touch()
-    return models
-
-
-def test_the_generators_logs_get_the_bundled_one(cache: Path) -> None:
+def test_the_generators_logs_get_the_bundled_one(cached_network: Path) -> None:
     assert choose_network(None, generated=True) == Chosen(detector(), "bundled")
-    assert cache.is_dir()
+    assert cached_network.is_dir()
 
 
-def test_other_logs_get_the_one_in_the_cache(cache: Path) -> None:
-    assert choose_network(None, generated=False) == Chosen(cache / "nanodet.onnx", "nanodet")
+def test_other_logs_get_the_one_in_the_cache(cached_network: Path) -> None:
+    assert choose_network(None, generated=False) == Chosen(cached_network / "nanodet.onnx", "nanodet")
 
 
-def test_what_is_named_wins(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(cache)
-    (cache / "mine").touch()
+def test_what_is_named_wins(cached_network: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(cached_network)
+    (cached_network / "mine").touch()
     for generated in (False, True):
         assert choose_network(Path("bundled"), generated) == Chosen(detector(), "bundled")
-        assert choose_network(Path("nanodet"), generated) == Chosen(cache / "nanodet.onnx", "nanodet")
-        for file in (Path("x.onnx"), cache / "bundled", Path("models/nanodet"), Path("mine"), Url("s3://b/nanodet")):
+        assert choose_network(Path("nanodet"), generated) == Chosen(cached_network / "nanodet.onnx", "nanodet")
+        for file in (
+            Path("x.onnx"),
+            cached_network / "bundled",
+            Path("models/nanodet"),
+            Path("mine"),
+            Url("s3://b/nanodet"),
+        ):
             assert choose_network(file, generated) == Chosen(file, "file")
 
 
-def test_several_in_the_cache_have_to_be_told_apart(cache: Path) -> None:
-    (cache / "yard.onnx").touch()
+def test_several_in_the_cache_have_to_be_told_apart(cached_network: Path) -> None:
+    (cached_network / "yard.onnx").touch()
     with pytest.raises(UsageError, match="the cache has the networks nanodet, yard; choose one with --model NAME"):
         choose_network(None, generated=False)
-    assert choose_network(Path("yard"), generated=False) == Chosen(cache / "yard.onnx", "yard")
+    assert choose_network(Path("yard"), generated=False) == Chosen(cached_network / "yard.onnx", "yard")
     assert [(one.name, one.state) for one in listed()] == [
         ("bundled", "bundled"),
         ("nanodet", "fetched"),
