@@ -86,7 +86,7 @@ def test_a_network_is_checked_on_pictures(tmp_path: Path, capsys: pytest.Capture
     said = capsys.readouterr().out
     assert "model.onnx: YOLOv5 or YOLOv7, 0.0 MB" in said
     assert "2 classes: person, fire hydrant" in said
-    assert "ms an image of 64 x 64 on 1 thread\n" in said
+    assert "ms an image (64 x 64) on 1 thread\n" in said
     assert f"{tmp_path / 'a.png'}" in said
     assert cv2.imread(str(tmp_path / "out.png")).shape == (68, 64, 3)
 

@@ -164,6 +164,8 @@ def _trial(model: Location, names: Location | None, settings: list[str] | None) 
 
 
 def _checked(trial: "Trial", speeds: "list[Speed]", found: "Mapping[str, Detections]") -> dict[str, object]:
+    import dataclasses
+
     from mcap_landmarks.locations import size_of
 
     detector = trial.detector
@@ -174,7 +176,7 @@ def _checked(trial: "Trial", speeds: "list[Speed]", found: "Mapping[str, Detecti
         "input": str(detector.session.inputs[0]),
         "outputs": [str(output) for output in detector.session.outputs],
         "classes": list(detector.names),
-        "speeds": [{"threads": one.threads, "input_px": one.input_px, "ms": one.ms} for one in speeds],
+        "speeds": [dataclasses.asdict(one) for one in speeds],
         "images": list(found),
         "detections": [
             {"image": image, "class": name, "score": score, "box_px": box} for image, name, score, box in _boxes(found)
@@ -200,7 +202,8 @@ def _print_checked(trial: "Trial", speeds: "list[Speed]", found: "Mapping[str, D
     say(f"outputs: {', '.join(map(str, detector.session.outputs))}")
     for one in speeds:
         size = " x ".join(map(str, one.input_px[::-1]))
-        say(f"speed: {one.ms:.1f} ms an image of {size} on {one.threads} thread{'s' if one.threads > 1 else ''}")
+        looks = f"{one.parts} times {size}" if one.parts > 1 else size
+        say(f"speed: {one.ms:.1f} ms an image ({looks}) on {one.threads} thread{'s' if one.threads > 1 else ''}")
     rows = [
         [image, name, f"{score:.2f}", ", ".join(f"{side:.0f}" for side in box)]
         for image, name, score, box in _boxes(found)
