@@ -231,8 +231,9 @@ def test_nothing_is_nearer_than_a_hand() -> None:
     assert sigma[0] == pytest.approx(0.06 / 0.05, rel=0.01)
 
 
-def test_an_edge_in_the_box_of_something_before_is_hidden() -> None:
+def test_behind_an_edge_that_something_hides_an_object_goes_on_as_far_as_that_reaches() -> None:
     near, behind = box(0.3, 0.1, 0.1, -0.2), box(0.2, 0.05, 0.0, -0.1)
-    aside, above = box(-0.2, 0.05, -0.3, -0.1), box(0.15, 0.4, 0.12, 0.15)
-    hidden = seen(near, behind, aside, above).hidden
-    assert hidden.tolist() == [[False, False], [True, False], [False, False], [False, False]]
+    aside, above, cut = box(-0.2, 0.05, -0.3, -0.1), box(0.15, 0.4, 0.12, 0.15), box(0.7, 0.05, 0.4, -0.1)
+    slack_rad = seen(near, behind, aside, above, cut).slack_rad
+    hidden = np.arctan(0.3) - np.arctan(0.2)
+    np.testing.assert_allclose(slack_rad, [[0, 0], [hidden, 0], [0, 0], [0, 0], [np.inf, 0]], atol=1e-9)

@@ -22,7 +22,7 @@ def seen(solid: Solid, seed: int = 0) -> Array:
 def edges_of(solid: Solid, sigma_rad: float = 0.004) -> BoxEdges:
     shape = Rectangle(np.array([solid.x, solid.y]), solid.length_m, solid.width_m, solid.yaw_rad, np.eye(2))
     bearings = np.arctan2(*shape.corners.T[::-1])
-    return BoxEdges(HERE, float(bearings.max()), float(bearings.min()), sigma_rad, (False, False))
+    return BoxEdges(HERE, float(bearings.max()), float(bearings.min()), sigma_rad, (0.0, 0.0))
 
 
 def off_parallel(yaw_rad: float, other_rad: float) -> float:
@@ -69,7 +69,7 @@ def test_the_edges_of_a_box_tell_how_long_it_is() -> None:
 def test_a_side_that_is_seen_is_not_the_far_one_whatever_the_box_says() -> None:
     """Of a car behind another one only the side towards the street is seen, and its box reaches over the street."""
     side = np.column_stack([np.linspace(39.2, 43.0, 24), 5.6 + 0.03 * np.sin(np.arange(24))])
-    over_the_street = BoxEdges(HERE, np.arctan2(5.6, 39.2), np.arctan2(4.2, 43.0), 0.004, (False, False))
+    over_the_street = BoxEdges(HERE, np.arctan2(5.6, 39.2), np.arctan2(4.2, 43.0), 0.004, (0.0, 0.0))
     alone = completed(side, HERE, _known())
     assert alone.centre_xy[1] == pytest.approx(5.6 + 1.74 / 2, abs=0.15)
     assert completed(side, HERE, _known(), over_the_street).centre_xy[1] > 5.3
@@ -80,8 +80,8 @@ def test_where_something_hides_an_edge_a_car_may_go_on() -> None:
     rear = seen(Solid(41.0, 1.0, 4.2, 1.74, 1.5))
     half, left_rad, right_rad = rear[rear[:, 1] < 1.0], np.arctan2(1.0, 38.9), np.arctan2(0.13, 38.9)
     shown, hidden = (
-        completed(half, HERE, _known(), BoxEdges(HERE, left_rad, right_rad, 0.004, (cut, False)))
-        for cut in (False, True)
+        completed(half, HERE, _known(), BoxEdges(HERE, left_rad, right_rad, 0.004, (slack_rad, 0.0)))
+        for slack_rad in (0.0, 0.05)
     )
     assert hidden.centre_xy[1] > shown.centre_xy[1] + 0.2
     off = hidden.centre_xy - [41.0, 1.0]

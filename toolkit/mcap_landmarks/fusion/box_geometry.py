@@ -35,7 +35,8 @@ class BoxGeometry:
 
     Bearings left, right and middle (M,) in rad about the camera, and half the angle between left and right; slopes top
     and bottom (M,), height over distance; sigma_rad and sigma_slope (M,) of an edge; `cut` (M, 4): left, top, right,
-    bottom is the image's edge; `hidden` (M, 2): something before it has the left or right edge in its own box.
+    bottom is the image's edge; slack_rad (M, 2): how far the object may go on behind the left and the right edge, which
+    is endless behind the image's edge, and as far as that reaches behind something that stands before it.
     """
 
     left: Array
@@ -47,7 +48,7 @@ class BoxGeometry:
     sigma_rad: Array
     sigma_slope: Array
     cut: NDArray[np.bool_]
-    hidden: NDArray[np.bool_]
+    slack_rad: Array
 
     def covers(self, bearing_rad: float, margin_rad: float, of: NDArray[np.bool_]) -> bool:
         """Whether any of some boxes, by a mask (M,), reaches across a bearing, give or take a margin."""
@@ -79,18 +80,23 @@ def box_geometry(view: CameraView, boxes_xyxy: Array, config: FuseConfig) -> Box
         sigma_rad=np.abs(across) / wide * np.hypot(config.edge_px, config.edge_share * wide),
         sigma_slope=slope_per_px * np.hypot(config.edge_px, config.edge_share * high),
         cut=ends <= _EDGE_MARGIN_PX,
-        hidden=_hidden_sides(boxes_xyxy),
+        slack_rad=_slack(boxes_xyxy, bearings[:, :2], ends[:, [0, 2]] <= _EDGE_MARGIN_PX),
     )
 
 
-def _hidden_sides(boxes_xyxy: Array) -> NDArray[np.bool_]:
-    """Which left and right edges (M, 2) of boxes are in the box of something before theirs: that stands lower."""
+def _slack(boxes_xyxy: Array, bearings: Array, is_cut: NDArray[np.bool_]) -> Array:
+    """How far in rad what is in boxes may go on behind their left and right edges (M, 2), at some bearings (M, 2).
+
+    A box whose lower edge is lower stands before another one, whose edge it hides if that is within it.
+    """
     x1, y1, x2, y2 = boxes_xyxy.T
     before = (y2[None, :] > y2[:, None]) & (y1[None, :] < y2[:, None])
-    sides = [
-        (before & (edge[:, None] >= x1[None, :]) & (edge[:, None] <= x2[None, :])).any(axis=1) for edge in (x1, x2)
-    ]
-    return np.stack(sides, axis=1)
+    slack = np.where(is_cut, np.inf, 0.0)
+    for side, edge in enumerate((x1, x2)):
+        hides = before & (edge[:, None] >= x1[None, :]) & (edge[:, None] <= x2[None, :])
+        reach = np.abs(wrap(bearings[None, :, side] - bearings[:, None, side]))
+        slack[:, side] = np.maximum(slack[:, side], np.where(hides, reach, 0.0).max(axis=1, initial=0.0))
+    return slack
 
 
 def misfits(

@@ -197,7 +197,7 @@ def _edges(look: Look, box: int, camera_xy: Array) -> BoxEdges:
         float(boxes.left[box]) + turned,
         float(boxes.right[box]) + turned,
         float(boxes.sigma_rad[box]),
-        (bool(boxes.cut[box, 0] or boxes.hidden[box, 0]), bool(boxes.cut[box, 2] or boxes.hidden[box, 1])),
+        (float(boxes.slack_rad[box, 0]), float(boxes.slack_rad[box, 1])),
     )
 
 

@@ -78,15 +78,15 @@ class Rectangle:
 class BoxEdges:
     """The edges of a box in an image as bearings left and right in rad, about `camera_xy` (2,), with their sigma.
 
-    An edge that is the image's own, or that of something before the object, is `cut` (left, right): the object may go
-    on behind it.
+    The object may go on behind them by slack_rad (left, right): without end behind the image's own edge, and as far as
+    something before the object reaches.
     """
 
     camera_xy: Array
     left_rad: float
     right_rad: float
     sigma_rad: float
-    cut: tuple[bool, bool]
+    slack_rad: tuple[float, float]
 
 
 def closeness(points_xy: Array, turns: int, most: int) -> tuple[Array, Array, Array]:
@@ -194,11 +194,13 @@ def _seen_between(edges: BoxEdges, centre: Array, half: Array, axis: tuple[Array
             for i, j in ((1, 1), (1, -1), (-1, 1), (-1, -1))
         ]
     )
-    left = (corners.max(axis=0) - wrap(edges.left_rad - about)) / edges.sigma_rad
-    right = (wrap(edges.right_rad - about) - corners.min(axis=0)) / edges.sigma_rad
+    left, right = (
+        corners.max(axis=0) - wrap(edges.left_rad - about),
+        wrap(edges.right_rad - about) - corners.min(axis=0),
+    )
     total = np.zeros(centre.shape[:-1])
-    for off, is_cut in ((left, edges.cut[0]), (right, edges.cut[1])):
-        inwards = np.minimum(off, 0.0) if is_cut else off
+    for off, slack_rad in zip((left, right), edges.slack_rad, strict=True):
+        inwards = (np.minimum(off, 0.0) + np.maximum(off - slack_rad, 0.0)) / edges.sigma_rad
         hidden = np.where(inwards > 0, _HIDDEN / _HIDDEN_SIGMAS, _SHORT / _SHORT_SIGMAS)
         tail = np.exp(-np.abs(inwards) / np.where(inwards > 0, _HIDDEN_SIGMAS, _SHORT_SIGMAS))
         seen = (1 - _HIDDEN - _SHORT) / np.sqrt(2 * np.pi) * np.exp(-(inwards**2) / 2)
