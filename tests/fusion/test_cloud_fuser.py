@@ -134,6 +134,19 @@ def test_a_track_keeps_the_class_that_most_boxes_say() -> None:
     assert classes == [("car",)] * 4
 
 
+def test_an_object_beside_its_track_is_less_sure_than_alone() -> None:
+    """One that stands is not suddenly elsewhere: the points of two were taken for one, or those of its neighbour."""
+    motions, still, aside = ObjectMotions(), np.zeros(3), Solid(CAR.x, CAR.y + 1.5, 4.3, 1.75, 1.5, 0.1)
+    fuser = CloudFuser(FuseConfig(), motions)
+    for _ in range(5):
+        scene, _ = fused([("car", 0.7, CAR)], [CAR], fuser, odometry=still)
+        motions.add(scene, OdometryAt("odom", still, np.zeros((3, 3)), 0.0, 0.0))
+    off, _ = fused([("car", 0.7, aside)], [aside], fuser, odometry=still)
+    alone, _ = fused([("car", 0.7, aside)], [aside])
+    assert off.ids == scene.ids
+    assert np.trace(off.covariances[0]) > 4 * np.trace(alone.covariances[0])
+
+
 def test_what_the_image_cuts_goes_on_beside_it() -> None:
     """A LiDAR sees all of a car that is driven past; its rear alone could lie any way."""
     beside = Solid(5.0, -4.0, 4.3, 1.75, 1.5)

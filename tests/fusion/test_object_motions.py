@@ -1,6 +1,7 @@
 """The velocities of a scene's objects, and which objects of a new scan are which of the scan before."""
 
 import numpy as np
+import pytest
 from mcap_landmarks.fusion.object_motions import ObjectMotions
 from mcap_landmarks.geometry.se2 import Array, inverse, transform_points
 from mcap_landmarks.messages.scene import SceneObjects
@@ -85,3 +86,27 @@ def test_without_odometry_nothing_is_followed() -> None:
     assert names == [("1",), ("2",)]
     scene = SceneObjects(1, "base", ("1",), ((("car", 0.9),),), places, SPREAD[None], np.ones(1))
     assert motions.add(scene, None) is None
+
+
+def test_a_place_off_the_others_is_a_surprise_and_one_where_it_should_be_is_none() -> None:
+    follower = Follower()
+    for _ in range(5):
+        follower.see([("car", 20.0, 0.0), ("car", 20.0, 8.0)])
+    stamp_ns, base = follower.stamp_ns + PERIOD_NS, np.array([5.0, 0.0, 0.0])
+    points = transform_points(inverse(base), np.array([[20.0, 0.0], [20.0, 9.2], [3.0, 3.0]]))
+    seen = points, np.tile(SPREAD, (3, 1, 1))
+    there, off, new = follower.motions.surprises(stamp_ns, base, seen, ("1", "2", "3"))
+    assert there == pytest.approx(0.0, abs=1e-9)
+    # 1.2 m off, where both are known to 0.2 m, and tracks to 5 cm more at best.
+    assert off == pytest.approx(1.2**2 / (2 * (0.2**2 + 0.05**2)) / 2)
+    assert new == 1.0
+    assert follower.motions.surprises(stamp_ns, None, seen, ("1", "2", "3")).tolist() == [1.0, 1.0, 1.0]
+
+
+def test_what_drives_is_expected_where_its_velocity_takes_it() -> None:
+    follower = Follower()
+    for i in range(8):
+        follower.see([("car", 40.0 - 1.2 * i, 2.0)])
+    stamp_ns, base = follower.stamp_ns + PERIOD_NS, np.zeros(3)
+    seen = np.array([[40.0 - 1.2 * 8, 2.0]]), SPREAD[None]
+    assert follower.motions.surprises(stamp_ns, base, seen, ("1",))[0] == pytest.approx(0.0, abs=1e-6)

@@ -36,15 +36,16 @@ class CloudFuser:
         one.
         """
         if not images:
-            return _scene(cloud, (), [], [], np.zeros((0, 2))), 0
+            return _scene(cloud, (), [], [], np.zeros((0, 2)), np.zeros(0)), 0
         objects = distinct([objects_in(cloud, image, self._config) for image in images])
-        centres = np.array([views[0].found.place.centre_xy for views in objects]).reshape(-1, 2)
-        spreads = np.array([views[0].found.place.covariance for views in objects]).reshape(-1, 2, 2)
         seen_as = [views[0].thing.name for views in objects]
-        names = self._motions.names(cloud.stamp_ns, odometry, (centres, spreads), seen_as)
+        seen = _seen([views[0].found.place for views in objects])
+        names = self._motions.names(cloud.stamp_ns, odometry, seen, seen_as)
         classes = [self._learn(name, views) for name, views in zip(names, objects, strict=True)]
         best = [options[0][0] for options in classes]
-        scene = _scene(cloud, names, classes, *_placed([views[0] for views in objects], best))
+        places, upright_m = _placed([views[0] for views in objects], best)
+        surprises = self._motions.surprises(cloud.stamp_ns, odometry, _seen(places), names)
+        scene = _scene(cloud, names, classes, places, upright_m, np.maximum(surprises, 1.0))
         explained = sum(one.thing.boxes for views in objects for one in views)
         return scene, sum(len(image.detections) for image in images) - explained
 
@@ -76,11 +77,26 @@ def _as(seen: ViewedObject, name: str) -> FoundObject:
     return replace(found, place=place_by_camera(look, found.box, name) or found.place)
 
 
-def _scene(
-    cloud: ClusteredCloud, names: tuple[str, ...], classes: list[Hypotheses], places: list[Rectangle], upright_m: Array
-) -> SceneObjects:
-    """Objects as a message; upright_m (N, 2) are the heights of their feet in the base frame, and their own."""
+def _seen(places: Sequence[Rectangle]) -> tuple[Array, Array]:
+    """Centres (N, 2) and covariances (N, 2, 2)."""
     centres = np.array([place.centre_xy for place in places]).reshape(-1, 2)
+    return centres, np.array([place.covariance for place in places]).reshape(-1, 2, 2)
+
+
+def _scene(
+    cloud: ClusteredCloud,
+    names: tuple[str, ...],
+    classes: list[Hypotheses],
+    places: list[Rectangle],
+    upright_m: Array,
+    unsure: Array,
+) -> SceneObjects:
+    """Objects as a message.
+
+    upright_m (N, 2) are the heights of their feet in the base frame, and their own; covariances are `unsure` (N,) times
+    what was fitted.
+    """
+    centres, covariances = _seen(places)
     sizes = np.array([[place.length_m, place.width_m] for place in places]).reshape(-1, 2)
     return SceneObjects(
         cloud.stamp_ns,
@@ -88,7 +104,7 @@ def _scene(
         names,
         tuple(classes),
         centres,
-        np.array([place.covariance for place in places]).reshape(-1, 2, 2),
+        unsure[:, None, None] * covariances,
         sizes[:, 0] / 2,
         Boxes(
             np.column_stack([centres, upright_m[:, 0] + upright_m[:, 1] / 2]),

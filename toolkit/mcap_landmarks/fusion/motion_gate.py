@@ -50,11 +50,10 @@ def _is_vehicle(name: str) -> bool:
 def _density(motion: TrackMotion, name: str, stamp_ns: int, places: Array, covariances: Array) -> Array:
     """How likely an object is to be at places (N, 2), per m^2."""
     last, since_s = motion.last, (stamp_ns - motion.last.stamp_ns) / 1e9
+    if motion.moving == 1.0:
+        there, unsure = motion.expected(stamp_ns)
+        return _normal(places - there, covariances + unsure + _WANDER_M**2 * np.eye(2))
     spread = covariances + last.covariance + _WANDER_M**2 * np.eye(2)
-    if motion.moving == 1.0 and motion.velocity is not None:
-        return _normal(
-            places - last.place_xy - since_s * motion.velocity.xy_mps, spread + since_s**2 * motion.velocity.covariance
-        )
     stands = _normal(places - last.place_xy, spread)
     speed = speed_mps(name)
     if not speed:

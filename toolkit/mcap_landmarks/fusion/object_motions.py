@@ -42,6 +42,23 @@ class ObjectMotions:
         found = match(motions, stamp_ns, _placed(*seen, odom_from_base), classes)
         return tuple(known[found[i]] if i in found else self._new() for i in range(len(classes)))
 
+    def surprises(
+        self, stamp_ns: int, odom_from_base: Array | None, seen: tuple[Array, Array], names: Sequence[str]
+    ) -> Array:
+        """How far objects (N,) are off where they should be by their tracks: squared, by both covariances, per degree.
+
+        1, what is to be expected, for those that were not seen before. `seen` is as in `names`.
+        """
+        factors = np.ones(len(names))
+        if odom_from_base is None:
+            return factors
+        for i, (place, spread) in enumerate(zip(*_placed(*seen, odom_from_base), strict=True)):
+            if names[i] in self._motions:
+                there, unsure = self._motions[names[i]].expected(stamp_ns)
+                off = place - there
+                factors[i] = off @ np.linalg.solve(spread + unsure, off) / 2
+        return factors
+
     def add(self, scene: SceneObjects, odometry: OdometryAt | None) -> SceneVelocities | None:
         """The velocities of a scene's objects, now that it was seen; None without odometry."""
         if odometry is None:

@@ -65,6 +65,20 @@ class TrackMotion:
         """Where it was last."""
         return self._places[-1]
 
+    def expected(self, stamp_ns: int) -> tuple[Array, Array]:
+        """Where it should be at a time: place (2,) and covariance (2, 2).
+
+        What stands should be where it was on the whole; that is no surer for many places, whose errors are alike.
+        """
+        if self.moving == 1.0 and self.velocity is not None:
+            since_s = (stamp_ns - self.last.stamp_ns) / 1e9
+            ahead = self.last.place_xy + since_s * self.velocity.xy_mps
+            return ahead, self.last.covariance + since_s**2 * self.velocity.covariance
+        covariances = np.array([one.covariance for one in self._places])
+        weights = _weights(covariances)
+        places = np.array([one.place_xy for one in self._places])
+        return weights @ places, np.einsum("n,nij->ij", weights, covariances)
+
     def note(self, place: TrackPlace, speed_mps: float) -> None:
         """Another place, later than those before, of something of a class that is usually so fast."""
         since = place.stamp_ns - _WINDOW_NS
@@ -84,8 +98,7 @@ class TrackMotion:
         times = np.array([(one.stamp_ns - self.last.stamp_ns) / 1e9 for one in self._places])
         places = np.array([one.place_xy for one in self._places])
         covariances = np.array([one.covariance for one in self._places])
-        weights = 1 / np.trace(covariances, axis1=1, axis2=2)
-        weights /= weights.sum()
+        weights = _weights(covariances)
         since, off = times - weights @ times, places - weights @ places
         velocity = (weights * since) @ off / (weights @ since**2)
         spread = 2 * np.einsum("n,nij->ij", weights, covariances) + self._drift() * np.eye(2)
@@ -108,6 +121,13 @@ class TrackMotion:
         position = (_POSITION_SHARE * way) ** 2
         heading = _HEADING_RAD**2 * way + (_HEADING_SHARE * turned) ** 2
         return position + heading * last.range_m**2
+
+
+def _weights(covariances: Array) -> Array:
+    """How much places with covariances (N, 2, 2) count, (N,), in all 1."""
+    weights: Array = 1 / np.trace(covariances, axis1=1, axis2=2)
+    weights /= weights.sum()
+    return weights
 
 
 def _odds(velocity: Velocity, speed_mps: float) -> float:
