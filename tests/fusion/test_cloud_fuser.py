@@ -136,7 +136,7 @@ def test_a_track_keeps_the_class_that_most_boxes_say() -> None:
 
 def test_an_object_beside_its_track_is_less_sure_than_alone() -> None:
     """One that stands is not suddenly elsewhere: the points of two were taken for one, or those of its neighbour."""
-    motions, still, aside = ObjectMotions(), np.zeros(3), Solid(CAR.x, CAR.y + 1.5, 4.3, 1.75, 1.5, 0.1)
+    motions, still, aside = ObjectMotions(), np.zeros(3), Solid(CAR.x, CAR.y + 0.8, 4.3, 1.75, 1.5, 0.1)
     fuser = CloudFuser(FuseConfig(), motions)
     for _ in range(5):
         scene, _ = fused([("car", 0.7, CAR)], [CAR], fuser, odometry=still)
