@@ -10,8 +10,9 @@ from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY, SCAN, S
 from mcap_landmarks.inspection.checks import Finding
 from mcap_landmarks.inspection.info import describe
 from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.progress import unwatched
 from mcap_landmarks.recording.writer import create_recording
-from mcap_landmarks.stage import Channel, RawMessage, Stamped, unwatched
+from mcap_landmarks.stage import Channel, RawMessage, Stamped
 
 from tests.cli.logs import write
 from tests.runs.chain import STEP_NS, raw_messages

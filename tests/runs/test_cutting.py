@@ -15,6 +15,7 @@ from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.qos import KEY
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.progress import unwatched
 from mcap_landmarks.recording.latched import latched
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import create_recording
@@ -23,7 +24,7 @@ from mcap_landmarks.runs.conversion import Selection
 from mcap_landmarks.runs.convert import convert
 from mcap_landmarks.runs.pipeline import LogRun, run_stages
 from mcap_landmarks.runs.plan import Request
-from mcap_landmarks.stage import Connection, RawMessage, Stamped, unwatched
+from mcap_landmarks.stage import Connection, RawMessage, Stamped
 
 from tests.maps.examples import small_map
 from tests.runs.chain import STEP_NS, raw_messages, two_posts

@@ -293,3 +293,15 @@ def test_refusals(here: Path) -> None:
         run_stages(asked(here, "blind.mcap"), here / "out.mcap", ["localize"], "localize", lacking=True)
     assert not (here / "out.mcap").exists()
     assert not (here / ".out.mcap.parts").exists()
+
+
+def test_what_a_network_found_is_kept_where_nobody_names_it_again(here: Path) -> None:
+    run_stages(asked(here), here / "out.mcap", FRONT, "run")
+    unnamed = asked(here, "out.mcap", files={"map": here / "map.db"})
+    run = run_stages(unnamed, here / "again.mcap", ALL, "run")
+    assert states(run) == {"cluster": "reused", "detect": "reused", "fuse": "reused", "localize": "ran"}
+    changed = dataclasses.replace(unnamed, settings={"detect": {"confidence": 0.9}})
+    with pytest.raises(UsageError, match=r"detect has to run anew \(confidence changed .*; give --model FILE"):
+        run_stages(changed, here / "changed.mcap", FRONT, "run")
+    named = dataclasses.replace(changed, files={"model": here / "model.onnx"})
+    assert states(run_stages(named, here / "changed.mcap", FRONT, "run"))["detect"] == "ran"

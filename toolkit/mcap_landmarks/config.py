@@ -5,7 +5,7 @@ import dataclasses
 import difflib
 import json
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -144,11 +144,17 @@ class Files:
 
 
 def load_files(
-    stage: Stage, settings: Settings, given: Mapping[str, Location | None], *, generated: bool = False
+    stage: Stage,
+    settings: Settings,
+    given: Mapping[str, Location | None],
+    *,
+    generated: bool = False,
+    kept: Collection[str] = (),
 ) -> tuple[Config, Files]:
     """The configuration of a stage, and its files: `given` ones, else those that the settings name, such as
-    `detect.model`, else what the stage chooses; `generated` says that the log is the generator's. Files are no part of
-    the configuration, so that no path gets into a manifest.
+    `detect.model`, else what the stage chooses; `generated` says that the log is the generator's. Those that are `kept`
+    are left out, unless they are given or named. Files are no part of the configuration, so that no path gets into a
+    manifest.
 
     Raises:
         UsageError: a file that the stage cannot do without is not given, and none can be chosen.
@@ -156,13 +162,18 @@ def load_files(
     own = dict(settings.get(stage.name, {}))
     files = {name: location(str(own.pop(name))) for name in stage.files if name in own}
     files.update({name: path for name, path in given.items() if path is not None and name in stage.files})
-    chosen = {name: choose(files.get(name), generated) for name, choose in stage.choices.items()}
+    kept = {*kept} - {*files}
+    chosen = {name: choose(files.get(name), generated) for name, choose in stage.choices.items() if name not in kept}
     files.update({name: choice.path for name, choice in chosen.items()})
-    for name in stage.resources:
-        if name not in files:
-            raise UsageError(f"{stage.name} needs a {name}; give --{name} FILE or --set {stage.name}.{name}=FILE")
+    _check_given(stage, {*files, *kept})
     origins = {name: choice.origin for name, choice in chosen.items()}
     return stage_config(stage.config, stage.name, own), Files(files, origins)
+
+
+def _check_given(stage: Stage, names: Collection[str]) -> None:
+    for name in stage.resources:
+        if name not in names:
+            raise UsageError(f"{stage.name} needs a {name}; give --{name} FILE or --set {stage.name}.{name}=FILE")
 
 
 def load(name: str, settings: Settings) -> Config:

@@ -5,9 +5,7 @@ A stage is one file in `stages/` with a `Stage` named STAGE; no other file knows
 the second argument; `runs/plan.py` tells the way there.
 """
 
-import contextlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import Field, dataclass, field
 from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 
@@ -17,6 +15,7 @@ from numpy.typing import NDArray
 from mcap_landmarks.geometry.se2 import Array, between, exp, interpolate
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.codec import M, Message
+from mcap_landmarks.progress import Progress
 
 M_co = TypeVar("M_co", bound=Message, covariant=True)
 """A `Channel[Message]` is a channel of any messages, since a channel only says which its are."""
@@ -44,23 +43,6 @@ class ChannelSummary:
 
     connection: Connection
     count: int
-
-
-Progress = Callable[[int], None]
-"""Is told how much was done since the last time: bytes, where nothing else is said."""
-
-
-class Watch(Protocol):
-    """Shows the progress of work, such as `mcap_landmarks.cli.console.progress`."""
-
-    def __call__(self, label: str, total: int | None, unit: str = ..., /) -> AbstractContextManager[Progress]:
-        """What is done, how much there is to do, if that is known, and what is counted: bytes, if nothing is said."""
-
-
-@contextlib.contextmanager
-def unwatched(_label: str, _total: int | None, _unit: str = "bytes") -> Iterator[Progress]:
-    """Shows nothing."""
-    yield lambda _advance: None
 
 
 class RawMessage(NamedTuple):

@@ -20,8 +20,9 @@ from mcap_landmarks.locations import Location, size_of
 from mcap_landmarks.manifest import RUN
 from mcap_landmarks.maps.database import read_manifest, read_map
 from mcap_landmarks.messages.annotations import ImageAnnotations
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import Recording, open_recording
-from mcap_landmarks.stage import Progress, Tolerance
+from mcap_landmarks.stage import Tolerance
 
 
 @dataclass(frozen=True, slots=True)

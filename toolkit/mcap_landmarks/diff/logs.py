@@ -19,8 +19,9 @@ from mcap_landmarks.messages.columns import Column, Kind
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.layout import Layout, layout_of
 from mcap_landmarks.messages.typestore import definition, typestore
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import Recording
-from mcap_landmarks.stage import Connection, Progress, RawMessage, Tolerance
+from mcap_landmarks.stage import Connection, RawMessage, Tolerance
 
 HELD_BYTES = 1 << 23
 """So much of both recordings is held before it is compared."""

@@ -25,8 +25,9 @@ from mcap_landmarks.maps.exchange_thesis import parse_results
 from mcap_landmarks.maps.map_message import scene_from_map
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import Recording, open_recording
-from mcap_landmarks.stage import Channel, Connection, Progress
+from mcap_landmarks.stage import Channel, Connection
 
 _RESULTS = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, MAP, MAP_POSE)
 _TRUTH = (TRUTH_POSE, TRUTH_OBJECTS)

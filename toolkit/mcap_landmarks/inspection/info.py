@@ -15,9 +15,9 @@ from mcap_landmarks.inspection.topic_roles import ROLES, could_be, topics_for
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import is_generated
 from mcap_landmarks.networks.choice import choose_network
+from mcap_landmarks.progress import Watch
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.sources import Log
-from mcap_landmarks.stage import Watch
 
 TRUTH, RESULTS = "truth", "results"
 _BY_TOPIC = {

@@ -9,10 +9,11 @@ from pathlib import Path
 from mcap_landmarks.config import Settings, stage_config
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.locations import Location, to_read
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import RecordingWriter
 from mcap_landmarks.sources import Carried, Log, McapFile, source_of
-from mcap_landmarks.stage import ChannelSummary, Config, Connection, Progress, RawMessage
+from mcap_landmarks.stage import ChannelSummary, Config, Connection, RawMessage
 
 
 @dataclass(frozen=True, slots=True)

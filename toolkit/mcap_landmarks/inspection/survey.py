@@ -19,8 +19,9 @@ from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.poses import Odometry
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.sources import merge
-from mcap_landmarks.stage import Connection, Progress, RawMessage
+from mcap_landmarks.stage import Connection, RawMessage
 
 SENSORS = ("image", "camera_info", "scan", "odometry", "scene_objects")
 """The roles that are looked at."""

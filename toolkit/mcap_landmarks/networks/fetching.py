@@ -11,7 +11,7 @@ from mcap_landmarks.networks.known import KnownNetwork
 from mcap_landmarks.networks.npm_package import package_files
 from mcap_landmarks.networks.tfjs import read_graph
 from mcap_landmarks.networks.tfjs_to_onnx import OnnxNames, onnx_bytes
-from mcap_landmarks.stage import Progress
+from mcap_landmarks.progress import Progress
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from mcap_landmarks.errors import ModelError, UsageError
 from mcap_landmarks.locations import Location, to_read
-from mcap_landmarks.stage import Progress
+from mcap_landmarks.progress import Progress
 
 _MOST_BYTES = 1 << 26
 """More than any file that is wanted: eight times the weights of NanoDet-g."""

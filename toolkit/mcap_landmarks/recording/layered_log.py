@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import STAGE, StageRecord, stage_records
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import Recording
-from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
+from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,11 +14,12 @@ from mcap.exceptions import McapError
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, carried_fingerprint
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.blocks import DamagedBlockError, block_messages
 from mcap_landmarks.recording.container import CHUNK, MAGIC, RECORD, Opcode, parse
 from mcap_landmarks.recording.rebuild_index import index_by_scanning
 from mcap_landmarks.recording.summary_index import Block, Index, index_from_summary, read_record
-from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
+from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 
 
 @contextlib.contextmanager

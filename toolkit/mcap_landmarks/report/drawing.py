@@ -18,7 +18,7 @@ from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.database import read_map
 from mcap_landmarks.maps.model import Group
 from mcap_landmarks.messages.scene import SceneObjects
-from mcap_landmarks.stage import Progress
+from mcap_landmarks.progress import Progress
 
 _MAX_GAP_NS = 5 * 10**8
 """The truth is interpolated over gaps up to this, as `evaluate` does by default."""

@@ -11,6 +11,7 @@ from mcap_landmarks.manifest import Manifest, Outcome
 from mcap_landmarks.mapping.built_map import BuiltMap
 from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.maps.database import read_map, write_map
+from mcap_landmarks.progress import Watch, unwatched
 from mcap_landmarks.runs.map_plan import LogPlan, MapPlan, MapTask, plan_map
 from mcap_landmarks.runs.map_results import (
     MappedLog,
@@ -25,7 +26,6 @@ from mcap_landmarks.runs.pipeline import check_output, told
 from mcap_landmarks.runs.session import Session, StageRun, open_session, parts_folder
 from mcap_landmarks.runs.stage_input import StageInput
 from mcap_landmarks.runs.stage_runner import outcome_of
-from mcap_landmarks.stage import Watch, unwatched
 from mcap_landmarks.stages.build_map import STAGE
 
 

@@ -13,10 +13,11 @@ from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog
 from mcap_landmarks.manifest import CARRIED, RUN, Manifest, entry_text, is_generated
 from mcap_landmarks.messages.qos import KEY
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.sources import Piece, merge
-from mcap_landmarks.stage import Connection, Progress, RawMessage
+from mcap_landmarks.stage import Connection, RawMessage
 
 _LOST_WITH = frozenset({RUN, "rosbag2"})  # metadata records that would no longer be true
 _COMMENT = re.compile(rb"#[^\n]*")

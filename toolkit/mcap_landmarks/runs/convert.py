@@ -13,9 +13,9 @@ from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.inspection.open_logs import OpenLog, open_logs
 from mcap_landmarks.locations import Location, to_write
 from mcap_landmarks.manifest import file_hash
+from mcap_landmarks.progress import Watch
 from mcap_landmarks.runs.conversion import Converted, Job, Selection
 from mcap_landmarks.runs.outputs import make_folder, output_files
-from mcap_landmarks.stage import Watch
 
 
 @dataclass(slots=True)

@@ -11,6 +11,7 @@ from mcap_landmarks.channels import MATCH, POSE, POSE_COVARIANCE
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.match import LandmarkMatch
+from mcap_landmarks.progress import Watch, unwatched
 from mcap_landmarks.recording.time_association import WINDOW_NS
 from mcap_landmarks.runs.bundles import Reading
 from mcap_landmarks.runs.needed_stages import missing_stages
@@ -18,7 +19,7 @@ from mcap_landmarks.runs.plan import Request, Step, plan
 from mcap_landmarks.runs.session import Session, open_session
 from mcap_landmarks.runs.stage_input import StageInput
 from mcap_landmarks.runs.stage_runner import naming
-from mcap_landmarks.stage import Omission, Stamped, Watch, unwatched
+from mcap_landmarks.stage import Omission, Stamped
 from mcap_landmarks.stages import find_stage
 
 _LOCALIZE = "localize"

@@ -15,12 +15,13 @@ from mcap_landmarks.maps.map_markers import markers_from_map
 from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.poses import Path as PathMessage
 from mcap_landmarks.messages.poses import PoseStamped
+from mcap_landmarks.progress import Watch
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.runs.map_plan import LogPlan, MapPlan
 from mcap_landmarks.runs.output_writer import write_output
 from mcap_landmarks.runs.pipeline import told
 from mcap_landmarks.runs.session import StageRun, open_session, part_file
-from mcap_landmarks.stage import Stamped, Watch
+from mcap_landmarks.stage import Stamped
 
 _LOGS = "logs"
 """The manifest's option with what came of each log: of the stages before, then of the map."""

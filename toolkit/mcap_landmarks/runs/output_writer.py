@@ -19,12 +19,13 @@ from mcap_landmarks.manifest import (
     told_carried,
     told_losses,
 )
+from mcap_landmarks.progress import Watch
 from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.layered_log import Layer, LayeredLog, own_layer
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.recording.writer import RecordingWriter, create_recording
 from mcap_landmarks.runs.session import Session
-from mcap_landmarks.stage import Connection, RawMessage, Watch
+from mcap_landmarks.stage import Connection, RawMessage
 
 
 def write_output(

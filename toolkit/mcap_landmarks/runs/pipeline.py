@@ -8,11 +8,11 @@ from mcap_landmarks.atomic import check_target
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, to_read
 from mcap_landmarks.manifest import Outcome
+from mcap_landmarks.progress import Watch, unwatched
 from mcap_landmarks.runs.needed_stages import in_order, missing_stages
 from mcap_landmarks.runs.output_writer import write_output
 from mcap_landmarks.runs.plan import Request, plan
 from mcap_landmarks.runs.session import StageRun, open_session, parts_folder
-from mcap_landmarks.stage import Watch, unwatched
 from mcap_landmarks.stages import find_stage
 
 

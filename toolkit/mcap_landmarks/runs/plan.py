@@ -3,11 +3,13 @@
 CONTRIBUTING.md follows a setting from the command line through `plan` to its stage.
 """
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 from mcap_landmarks.channels import ODOMETRY, RESULTS
 from mcap_landmarks.config import Settings, effective, load_files
+from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.inspection.topic_roles import ROLES, Choice
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RECORDING, StageRecord, code_hash, file_hash, is_generated
@@ -72,11 +74,32 @@ def plan(request: Request, log: RecordedLog, names: Sequence[str]) -> list[Step]
     for name in names:
         stage = find_stage(name)
         assert isinstance(stage, Stage)  # noqa: S101 - `needed_stages` gives no others
-        config, files = load_files(stage, request.settings, request.files, generated=generated)
+        earlier = None if request.force else _earlier(stage, log, generated)
+        kept = () if earlier is None else stage.choices
+        config, files = load_files(stage, request.settings, request.files, generated=generated, kept=kept)
         inputs, options = inputs_of_stage(stage, log, steps), _options(stage, request)
         record = replace(record_of(stage, config, files.paths, inputs, options), origins=files.origins)
+        if earlier is not None:
+            hashes = {name: value for name, value in earlier.resources.items() if name in kept}
+            origins = {**earlier.origins, **record.origins}
+            record = replace(record, resources={**hashes, **record.resources}, origins=origins)
         steps.append(Step(stage, config, files.paths, record))
     return steps
+
+
+def _earlier(stage: Stage, log: RecordedLog, generated: bool) -> StageRecord | None:
+    """The record of results in a log whose chosen files are not those that would be chosen now.
+
+    Nobody has to name the network again that made what a log holds.
+    """
+    layer = log.results.get(stage.name)
+    if layer is None or layer.record is None or not stage.choices:
+        return None
+    for name, choose in stage.choices.items():
+        with contextlib.suppress(ToolkitError):
+            if file_hash(choose(None, generated).path) == layer.record.resources.get(name):
+                return None
+    return layer.record
 
 
 def inputs_of_stage(stage: Stage | Reduction, log: RecordedLog, steps: Sequence[Step]) -> dict[str, str]:

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mcap_landmarks.channels import SHARED
-from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.inspection.topic_roles import chosen_before
 from mcap_landmarks.manifest import Outcome, StageRecord
+from mcap_landmarks.progress import Watch
 from mcap_landmarks.recording.layered_log import Layer, LayeredLog, result_layers
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.runs.plan import Request, Step
 from mcap_landmarks.runs.recorded_log import RecordedLog
 from mcap_landmarks.runs.stage_input import StageInput
 from mcap_landmarks.runs.stage_runner import run_stage
-from mcap_landmarks.stage import Watch
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +114,21 @@ class Session:
         if found is not None:
             return found
         name, reason = step.stage.name, self._why(step.record)
+        self._check_files(step, reason)
         target = part_file(self._parts, step.record)
         log = StageInput(step.stage, self.log_for(step.record), self.request.span)
         with watch(f"{name} {self.log.path.name}", log.count, "bundles") as progress:
             record = run_stage(step, log, self.request.thinning, target, progress)
         self._show(result_layers(self._open(target)))
         return StageRun(name, "ran", reason, record.outcome)
+
+    def _check_files(self, step: Step, reason: str) -> None:
+        lacking = [name for name in step.stage.resources if name not in step.files]
+        if lacking:
+            raise UsageError(
+                f"{self.log.path}: {step.stage.name} has to run anew ({reason}), and nothing tells where the "
+                f"{lacking[0]} is that made what the log holds; give --{lacking[0]} FILE"
+            )
 
     def find(self, record: StageRecord) -> StageRun | None:
         """The results with the key of a record, taken from where they lie; None if they lie nowhere."""

@@ -10,10 +10,11 @@ from mcap_landmarks.errors import UsageError
 from mcap_landmarks.inspection.cameras import NO_CAMERAS, Cameras, info_frames
 from mcap_landmarks.inspection.topic_roles import cameras_of, choose
 from mcap_landmarks.messages.codec import M
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.layered_log import LayeredLog
 from mcap_landmarks.runs.bundles import Reading, Span, decoded, held_before, inputs_of, read_bundles
 from mcap_landmarks.runs.thinning import Thinning, thin
-from mcap_landmarks.stage import Bundle, Channel, Connection, Progress, RawMessage, Reduction, Stage
+from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage, Reduction, Stage
 
 _EVERY_MESSAGE = Thinning()
 

@@ -8,13 +8,14 @@ from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, Manifest, Outcome, StageRecord
 from mcap_landmarks.messages.codec import Message
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.runs.bundles import Reading
 from mcap_landmarks.runs.plan import Step
 from mcap_landmarks.runs.stage_input import StageInput
 from mcap_landmarks.runs.tallies import tally
 from mcap_landmarks.runs.thinning import Thinning
-from mcap_landmarks.stage import Channel, Config, LeftOut, Omission, Progress, Stage, Stamped
+from mcap_landmarks.stage import Channel, Config, LeftOut, Omission, Stage, Stamped
 
 
 def run_stage(step: Step, log: StageInput, thinning: Thinning, target: Path, progress: Progress) -> StageRecord:

@@ -13,8 +13,9 @@ import zstandard
 
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.messages.qos import KEY
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.sources._ros2_types import check_fits, definition_in, known_distribution
-from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
+from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _REPORT_BYTES = 1 << 20

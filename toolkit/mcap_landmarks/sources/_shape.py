@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from mcap_landmarks.stage import ChannelSummary, Config, Connection, Progress, RawMessage
+from mcap_landmarks.progress import Progress
+from mcap_landmarks.stage import ChannelSummary, Config, Connection, RawMessage
 
 Payload = bytes | memoryview
 

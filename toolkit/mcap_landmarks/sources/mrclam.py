@@ -25,6 +25,7 @@ from mcap_landmarks.messages.poses import Odometry, PoseStamped
 from mcap_landmarks.messages.qos import KEY, qos_profile
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.typestore import definition
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.sources._merge import merge
 from mcap_landmarks.sources._mrclam_files import DataSet, MrclamTable, file_names, keep, open_data_set
 from mcap_landmarks.sources._mrclam_robot import (
@@ -36,7 +37,7 @@ from mcap_landmarks.sources._mrclam_robot import (
     scans,
 )
 from mcap_landmarks.sources._shape import Source, SourceLog
-from mcap_landmarks.stage import Channel, ChannelSummary, Connection, Progress, RawMessage
+from mcap_landmarks.stage import Channel, ChannelSummary, Connection, RawMessage
 
 _BARCODES, _LANDMARKS = "Barcodes.dat", "Landmark_Groundtruth.dat"
 

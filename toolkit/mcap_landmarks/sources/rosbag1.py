@@ -8,12 +8,13 @@ from pathlib import Path
 
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.messages.qos import KEY, qos_profile
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.sources._bag_container import MAGIC, BagConnection, BagMessage, ChunkInfo, DamagedBagError
 from mcap_landmarks.sources._bag_index import BagIndex, read_chunk, read_index
 from mcap_landmarks.sources._merge import merge
 from mcap_landmarks.sources._ros1_types import Convert, converted
 from mcap_landmarks.sources._shape import NoConfig, Source, SourceLog
-from mcap_landmarks.stage import ChannelSummary, Connection, Progress, RawMessage
+from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 
 
 def recognises(path: Path) -> bool:
