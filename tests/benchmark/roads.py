@@ -4,13 +4,16 @@ python -m tests.benchmark.roads [--json] [--quick]
 """
 
 import sys
+import tempfile
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 import numpy as np
 
 from tests.benchmark.rows import Row, main
 from tests.real import roads
 from tests.real.roads_judge import Judged, judge_frames
+from tests.real.street import NEAR_M, THERE_M, Street, drive_street
 from tests.shared import data_folder
 
 BANDS_M = ((0, 10), (10, 20), (20, 30), (30, 1000))
@@ -33,6 +36,19 @@ def measure(quick: bool) -> Iterator[Row]:
         yield from rows(f"{label}, single frames", single, GOALS)
         street = judge_frames(data, roads.drive_frames(data / "roads" / "kitti_tracking_0001", drive))
         yield from rows(f"{label}, a street", street, {})
+    with tempfile.TemporaryDirectory() as folder:
+        yield from street_rows(drive_street(data, Path(folder)))
+
+
+def street_rows(street: Street) -> Iterator[Row]:
+    """The figures of the street whose even frames are mapped and whose odd ones are localized."""
+    cars, frames = len(street.cars_off_m), street.frames
+    found, there = np.count_nonzero(street.cars_off_m <= NEAR_M), np.count_nonzero(street.poses_off_m <= THERE_M)
+    yield Row("street map: parked cars within 0.35 m", found / cars, "", 10 / 14, cases=cars)
+    yield Row("street map: farthest landmark from any car", street.landmarks_off_m.max(), "m", at_most=2.0)
+    yield Row("street positions: within 0.2 m", there / frames, "", 0.8, cases=frames)
+    yield Row("street positions: median off", float(np.median(street.poses_off_m)), "m", cases=frames)
+    yield Row("street positions: NEES / 3", float(np.mean(street.poses_nees)) / 3, at_most=2.0, cases=frames)
 
 
 def rows(label: str, judged: Judged, goals: Mapping[str, float]) -> Iterator[Row]:
