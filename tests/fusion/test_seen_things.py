@@ -29,6 +29,12 @@ def test_a_vehicle_with_two_boxes_is_one_of_two_classes() -> None:
     assert found.box_xyxy.tolist() == [102, 101, 203, 182]
 
 
+def test_what_has_two_wheels_and_two_boxes_is_one() -> None:
+    (found,) = things(("bicycle", 0.5, (100, 100, 200, 180)), ("motorcycle", 0.3, (102, 101, 203, 182)))
+    assert [name for name, _ in found.classes] == ["bicycle", "motorcycle"]
+    assert len(things(("car", 0.5, (100, 100, 200, 180)), ("bicycle", 0.3, (102, 101, 203, 182)))) == 2
+
+
 def test_vehicles_that_hide_each_other_stay_two() -> None:
     assert len(things(("car", 0.6, (100, 100, 200, 180)), ("car", 0.5, (150, 100, 260, 170)))) == 2
 

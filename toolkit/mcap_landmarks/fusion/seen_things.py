@@ -1,4 +1,4 @@
-"""Boxes of an image that are of one thing: vehicles told twice, and people with what they ride."""
+"""Boxes of an image that are of one thing: what is told twice, and people with what they ride."""
 
 from dataclasses import dataclass, replace
 
@@ -8,13 +8,14 @@ from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.hypotheses import Hypotheses
 
-_VEHICLES = frozenset({"car", "van", "truck", "bus", "train"})
+_ALIKE = (frozenset({"car", "van", "truck", "bus", "train"}), frozenset({"bicycle", "motorcycle"}))
+"""Classes that detectors give one thing several of: vehicles, and what has two wheels."""
 _RIDDEN = {"bicycle": "cyclist", "motorcycle": "motorcycle"}
 """What people ride, and what it is called with them."""
 _RIDER = "person"
 _SAME = 0.6
-"""Boxes of two vehicles that overlap by more (intersection over union) are of one: detectors suppress them within a
-class only."""
+"""Boxes of such classes that overlap by more (intersection over union) are of one thing: detectors suppress them within
+a class only."""
 _RIDING = 0.15
 """A person who rides has at least this share of its box in that of what it rides: feet and legs."""
 _ASIDE = 0.4
@@ -43,7 +44,7 @@ def seen_things(detections: Detections) -> list[Seen]:
     for box, options in zip(detections.boxes_xyxy, detections.hypotheses, strict=True):
         things.append(Seen(box, ((options[0][0], 1.0),), float(options[0][1])))
     things.sort(key=lambda thing: -thing.score)
-    return _riders_joined(_vehicles_joined(things))
+    return _riders_joined(_alike_joined(things))
 
 
 def overlap(one: Array, other: Array) -> float:
@@ -56,7 +57,7 @@ def _area(box: Array) -> float:
     return float(np.prod(box[2:] - box[:2]))
 
 
-def _vehicles_joined(things: list[Seen]) -> list[Seen]:
+def _alike_joined(things: list[Seen]) -> list[Seen]:
     kept: list[Seen] = []
     for thing in things:
         same = next((i for i, other in enumerate(kept) if _are_one(thing, other)), None)
@@ -68,10 +69,10 @@ def _vehicles_joined(things: list[Seen]) -> list[Seen]:
 
 
 def _are_one(one: Seen, other: Seen) -> bool:
-    """Whether two boxes are of one vehicle."""
+    """Whether two boxes are of one thing."""
     shared = overlap(one.box_xyxy, other.box_xyxy)
     union = _area(one.box_xyxy) + _area(other.box_xyxy) - shared
-    return one.name in _VEHICLES and other.name in _VEHICLES and shared > _SAME * union
+    return any(one.name in alike and other.name in alike for alike in _ALIKE) and shared > _SAME * union
 
 
 def _told_twice(surer: Seen, other: Seen) -> Seen:
