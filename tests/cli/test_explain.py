@@ -1,25 +1,50 @@
 """The verb explain, on logs of scene objects and on one with detections, clusters, image and scan."""
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import jsonschema
 import numpy as np
 import pytest
-from mcap_landmarks.channels import CAMERA_IMAGE, DETECTIONS, MATCH, POSE, SCAN, SCAN_OBJECTS, SCENE_OBJECTS, TF_STATIC
+from mcap_landmarks.channels import (
+    CAMERA_IMAGE,
+    CAMERA_INFO,
+    CLUSTERED_CLOUD,
+    DETECTIONS,
+    MATCH,
+    POSE,
+    SCAN,
+    SCAN_OBJECTS,
+    SCENE_OBJECTS,
+    TF_STATIC,
+)
+from mcap_landmarks.fusion.cloud_fuser import CloudFuser
+from mcap_landmarks.fusion.config import FuseConfig
+from mcap_landmarks.fusion.object_motions import ObjectMotions
 from mcap_landmarks.localization.config import LocalizeConfig
-from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.manifest import RUN, Manifest, StageRecord
+from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.detections import Detections
-from mcap_landmarks.messages.images import Image
+from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.match import Status
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.recording.reader import open_recording
-from mcap_landmarks.stage import Bundle
+from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.report.explain_reading import read_situation
+from mcap_landmarks.stage import Bundle, Channel, Stamped
 
 from tests.cli.calls import call, schema_of
 from tests.diff.recordings import START_NS, localized_log, localized_messages, write
+from tests.fusion.test_cloud_fuser import BASE_FROM_CAMERA, CAMERA, CAR, clustered, detections, fused
+from tests.fusion.test_several_views import clustered as all_around
+from tests.fusion.test_several_views import corners
+from tests.fusion.turned_cameras import TurnedCamera
+from tests.lidar.clouds import Solid
 from tests.localization.logs import bundles, localized, unique_classes, write_log
 from tests.stages.test_localize_one_kind import AROUND, located, poses, scene
 
@@ -183,3 +208,114 @@ def test_a_position_without_heading(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert call("explain", log, "--at", 2, "-o", tmp_path / "e.svg") == 0
     assert "heading unknown" in (tmp_path / "e.svg").read_text()
     assert "holds  mirror_odds: 0 odds of the mirror image" in capsys.readouterr().out
+
+
+def of_a_cloud():  # type: ignore[no-untyped-def] # noqa: ANN201 - entries of a log
+    """A car that is an object and one that is none, an image, a cloud, and no map yet."""
+    far = Solid(70.0, 2.0, 4.2, 1.7, 1.5)
+    told = [("car", 0.8, CAR), ("car", 0.6, far)]
+    objects, _ = fused(told, [CAR, Solid(40.0, 0.0, 0.5, 60.0, 4.0)])
+    stamp_ns, (width, height) = objects.stamp_ns, CAMERA.size_px
+    mount = Transform(stamp_ns, "base_link", "camera", BASE_FROM_CAMERA[:3, 3], np.array([-0.5, 0.5, -0.5, 0.5]))
+    k, projection = CAMERA.intrinsics, np.column_stack([CAMERA.intrinsics, np.zeros(3)])
+    info = CameraInfo(stamp_ns, "camera", height, width, "", np.zeros(5), k, np.eye(3), projection)
+    picture = cv2.imencode(".png", np.zeros((height, width, 3), np.uint8))[1].tobytes()
+    return [
+        (TF_STATIC, stamp_ns, TFMessage((mount,))),
+        (CAMERA_INFO, stamp_ns, info),
+        (CAMERA_IMAGE, stamp_ns, CompressedImage(stamp_ns, "camera", "png", picture)),
+        (DETECTIONS, stamp_ns, replace(detections(told), stamp_ns=stamp_ns)),
+        (CLUSTERED_CLOUD, stamp_ns, clustered([CAR, Solid(40.0, 0.0, 0.5, 60.0, 4.0)])),
+        (SCENE_OBJECTS, stamp_ns, objects),
+    ]
+
+
+@pytest.mark.slow
+def test_a_cloud_that_was_not_localized_yet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = write(tmp_path / "r.mcap", of_a_cloud())
+    assert call("explain", log, "--at", 10**9, "-o", tmp_path / "e.svg") == 0
+    said = capsys.readouterr().out
+    assert said.startswith(f"bundle at {10**9}: not matched yet")
+    assert re.search(r"clustered: \d+ points above the ground, in 2 clusters\n", said)
+    assert "fused: 1 objects; detected, but no object: 1, as follows\n  car 0.60 about pixel " in said
+    drawn = (tmp_path / "e.svg").read_text()
+    for text in ("detections that are no object (red, dashed)", "1  car 0.", "edge of the image", "95 % region"):
+        assert text in drawn
+    document = explained(log, 10**9, capsys)
+    (one,), (missed,) = document["objects"], document["lost"]
+    assert one["size_m"] == pytest.approx([4.3, 1.75, 1.5], abs=0.4)
+    assert one["yaw_deg"] == pytest.approx(np.degrees(0.1), abs=6)
+    assert (missed["class"], missed["confidence"]) == ("car", 0.6)
+    assert "points fit no car well enough" in missed["reason"]
+
+
+def test_a_cloud_whose_camera_nobody_knows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What became of its boxes is told by the number of objects of their class, and drawn without boxes in space."""
+    bare = [entry for entry in of_a_cloud() if entry[0] not in {CAMERA_INFO, CAMERA_IMAGE}]
+    log = write(tmp_path / "r.mcap", bare)
+    assert call("explain", log, "--at", 10**9, "-o", tmp_path / "e.png") == 0
+    assert "fused: 1 objects; detected, but no object: 1 car" in capsys.readouterr().out
+    assert (tmp_path / "e.png").read_bytes().startswith(PNG)
+    assert explained(log, 10**9, capsys)["lost"] is None
+
+
+FRONT, SIDE = TurnedCamera("front", 0.0, 1.65, 700.0, (1200, 400)), TurnedCamera("side", 90.0, 1.65, 700.0, (600, 400))
+
+
+@pytest.fixture
+def two_cameras_beside_a_cloud(tmp_path: Path) -> Path:
+    """A car ahead and a person on the left, which are objects, and beyond the person a car that no beam meets."""
+    person, far = Solid(1.0, 8.0, 0.4, 0.4, 1.7), Solid(3.0, 70.0, 4.2, 1.7, 1.5)
+    told = [("car", corners(CAR)), ("person", corners(person)), ("car", corners(far))]
+    names, outlines = zip(*told, strict=True)
+    beside = all_around([CAR, person])
+    fuser = CloudFuser(FuseConfig(), ObjectMotions())
+    objects, _ = fuser.add(beside, [one.sees(names, outlines) for one in (FRONT, SIDE)], None)
+    at, entries = 10**9, list[tuple[Channel[Message], int, Message]]()
+    for one in (FRONT, SIDE):
+        width, height = one.size_px
+        picture = cv2.imencode(".png", np.zeros((height, width, 3), np.uint8))[1].tobytes()
+        image = CompressedImage(at, one.frame, "png", picture)
+        entries += [
+            (Channel(f"/{one.frame}/image_raw/compressed", CompressedImage), at, image),
+            (Channel(f"/{one.frame}/camera_info", CameraInfo), at, one.info),
+            (DETECTIONS, at, one.detects(names, outlines, at)),
+        ]
+    mounts = TFMessage(tuple(one.transform for one in (FRONT, SIDE)))
+    detected = StageRecord("detect", "", {}, {}, {}, {"images": ["all"]})
+    with create_recording(tmp_path / "r.mcap", {RUN: Manifest("run", stages=(detected,)).entries()}) as writer:
+        for entry in [(TF_STATIC, at, mounts), *entries, (CLUSTERED_CLOUD, at, beside), (SCENE_OBJECTS, at, objects)]:
+            writer.add(Stamped(entry[0], entry[1], entry[2]))
+    return tmp_path / "r.mcap"
+
+
+@pytest.mark.slow
+def test_several_cameras_beside_a_cloud(
+    two_cameras_beside_a_cloud: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A panel for each, with its own boxes and what they came to; the view from above once, with all that they show."""
+    log = two_cameras_beside_a_cloud
+    assert call("explain", log, "--at", 10**9, "-o", tmp_path / "e.svg") == 0
+    said = capsys.readouterr().out
+    assert "detected: car 0.80, in the image of front +0 ms beside the scan; person 0.80, car 0.80, in the" in said
+    assert re.search(r"  car 0.80 about pixel \d+, \d+ of side is no object: the LiDAR meets nothing of it", said)
+    drawn = (tmp_path / "e.svg").read_text()
+    for text in ("front, +0 ms beside the scan", "side, +0 ms beside the scan", "from above", "edge of an image"):
+        assert drawn.count(f">{text}") + drawn.count(f"<!-- {text}") == 1
+    document = explained(log, 10**9, capsys)
+    assert [one["camera"] for one in document["detections"]] == ["front", "side", "side"]
+    (missed,) = document["lost"]
+    assert (missed["class"], missed["camera"]) == ("car", "side")
+    assert sorted(one["class"] for one in document["objects"]) == ["car", "person"]
+
+
+def test_each_camera_has_its_own_boxes_in_space(two_cameras_beside_a_cloud: Path) -> None:
+    """Through the calibration of its own frame; what one camera lost is none of another's."""
+    situation, view = read_situation(two_cameras_beside_a_cloud, 10**9)
+    assert [None if one.detections is None else one.detections.frame_id for one in view.pictures] == ["front", "side"]
+    assert [seen.camera.size_px for seen in view.views] == [FRONT.size_px, SIDE.size_px]
+    for seen, one in zip(view.views, (FRONT, SIDE), strict=True):
+        np.testing.assert_allclose(seen.base_from_camera, one.base_from_camera, atol=1e-9)
+    assert [len(one.lost or ()) for one in view.pictures] == [0, 1]
+    assert [one.pixels.shape[1] for one in view.pictures if one.pixels is not None] == [1200, 600]
+    assert len(situation.detections) == 2

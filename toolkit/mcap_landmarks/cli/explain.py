@@ -1,9 +1,7 @@
 """Say why a bundle was localized or not, in words and as a picture."""
 
 import math
-from collections import Counter
-from functools import reduce
-from operator import or_
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, TypedDict
 
 import typer
@@ -16,6 +14,8 @@ if TYPE_CHECKING:
     from mcap_landmarks.evaluation.explain import Place, Situation
     from mcap_landmarks.messages.detections import Detections
     from mcap_landmarks.messages.match import LandmarkMatch
+    from mcap_landmarks.report.box_outcomes import LostBox
+    from mcap_landmarks.report.explain_reading import SensorData
 
 
 def command(
@@ -25,7 +25,9 @@ def command(
     at: Annotated[str, typer.Option("--at", metavar="TIME", help="When: RFC 3339 or integer nanoseconds.")],
     output: Annotated[
         Location | None,
-        typer.Option("-o", "--output", parser=location, help="Draw it, too: image, scan and map (.png, .svg, .pdf)."),
+        typer.Option(
+            "-o", "--output", parser=location, help="Draw it, too: image, scan or cloud, map (.png, .svg, .pdf)."
+        ),
     ] = None,
     json: options.Json = False,
 ) -> None:
@@ -52,25 +54,25 @@ def command(
         with atomic_file(output) as stream:
             save(partial(explanation_figure, situation, places, view, title), stream, form)
     if json:
-        say_json("explain", _document(situation, places))
+        say_json("explain", _document(situation, places, view))
     else:
-        _print(situation, places)
+        _print(situation, places, view)
 
 
 def _status(situation: "Situation") -> str:
     return "not matched yet" if situation.match is None else situation.match.status.name.lower()
 
 
-def _print(situation: "Situation", places: "tuple[Place, ...]") -> None:
+def _print(situation: "Situation", places: "tuple[Place, ...]", view: "SensorData") -> None:
     from mcap_landmarks.localization.decision import told
+    from mcap_landmarks.report.explain_words import sensed_lines
 
     match = situation.match
     before = match.bundles_joined - 1 if match is not None else 0
     joined = f", judged together with what {before} bundles before it saw" if before > 0 else ""
     say(f"bundle at {situation.stamp_ns}: {_status(situation)}{joined}")
-    say(f"detected: {_detected(situation)}")
-    say(f"clustered: {_clustered(situation)}")
-    say(f"fused: {_fused(situation)}")
+    for line in sensed_lines(situation, view):
+        say(line)
     if situation.scene is not None and len(situation.scene):
         say()
         _print_objects(situation, places)
@@ -84,42 +86,6 @@ def _print(situation: "Situation", places: "tuple[Place, ...]") -> None:
         say("The log does not tell the conditions of its matches; run localize on it again.")
     for condition in () if match is None else match.conditions:
         say(f"{'holds' if condition.held else 'FAILS'}  {condition.name}: {told(condition)}")
-
-
-def _detected(situation: "Situation") -> str:
-    told = []
-    for found in situation.detections:
-        names = ", ".join(f"{name} {score:.2f}" for options in found.hypotheses for name, score in options[:1])
-        apart_ms = (found.stamp_ns - situation.stamp_ns) / 1e6
-        image = f"image of {found.frame_id}" if len(situation.detections) > 1 else "image"
-        told.append(f"{names or 'no object'}, in the {image} {apart_ms:+.0f} ms beside the scan")
-    return "; ".join(told) or "nothing that the log tells"
-
-
-def _clustered(situation: "Situation") -> str:
-    found = situation.scan_objects
-    if found is None:
-        return "nothing that the log tells"
-    bare = sum(options[0][0] == "" for options in found.hypotheses if options)
-    return f"{len(found)} clusters, {bare} of them rather none of the known shapes"
-
-
-def _fused(situation: "Situation") -> str:
-    scene = situation.scene
-    if scene is None:
-        return "no scene objects at this time"
-    text = f"{len(scene)} objects"
-    if situation.detections:
-        seen = [Counter(options[0][0] for options in one.hypotheses if options) for one in situation.detections]
-        # What two cameras see may be the same.
-        left = reduce(or_, seen) - Counter(scene.classes)
-        if left:
-            text += f"; detected, but no object: {', '.join(f'{count} {name}' for name, count in sorted(left.items()))}"
-    if situation.landmarks is not None:
-        unknown = sorted(set(scene.classes) - set(situation.landmarks.classes))
-        if unknown:
-            text += f"; classes that the map lacks: {', '.join(unknown)}"
-    return text
 
 
 def _print_objects(situation: "Situation", places: "tuple[Place, ...]") -> None:
@@ -149,6 +115,8 @@ _ObjectEntry = TypedDict(
         "probability": float,
         "x_m": float,
         "y_m": float,
+        "yaw_deg": float | None,
+        "size_m": list[float] | None,
         "range_m": float,
         "bearing_deg": float,
         "sigma_m": float | None,
@@ -184,6 +152,8 @@ def _objects(situation: "Situation", places: "tuple[Place, ...]") -> list[_Objec
                 "probability": probability,
                 "x_m": x,
                 "y_m": y,
+                "yaw_deg": None if scene.boxes is None else float(np.degrees(scene.boxes.yaws_rad[i])),
+                "size_m": None if scene.boxes is None else scene.boxes.sizes_m[i].tolist(),
                 "range_m": float(np.hypot(x, y)),
                 "bearing_deg": float(np.degrees(np.arctan2(y, x))),
                 "sigma_m": spread,
@@ -220,16 +190,15 @@ def _pose(place: "Place") -> tuple[float, float, float]:
     return x, y, float(np.degrees(heading))
 
 
-def _document(situation: "Situation", places: "tuple[Place, ...]") -> dict[str, object]:
+def _document(situation: "Situation", places: "tuple[Place, ...]", view: "SensorData") -> dict[str, object]:
     match = situation.match
     return {
         "stamp_ns": situation.stamp_ns,
         "status": None if match is None else match.status.name.lower(),
         "bundles_joined": None if match is None else match.bundles_joined,
-        "detections": [entry for found in situation.detections for entry in _detections(found)]
-        if situation.detections
-        else None,
+        "detections": _detections(situation.detections) if situation.detections else None,
         "clusters": None if situation.scan_objects is None else len(situation.scan_objects),
+        "lost": None if view.lost is None else _lost(view.lost),
         "objects": None if situation.scene is None else _objects(situation, places),
         "places": [
             {
@@ -246,11 +215,25 @@ def _document(situation: "Situation", places: "tuple[Place, ...]") -> dict[str, 
     }
 
 
-def _detections(found: "Detections") -> list[dict[str, object]]:
+def _detections(images: "Sequence[Detections]") -> list[dict[str, object]]:
     return [
         {"class": hypotheses[0][0], "confidence": hypotheses[0][1], "xyxy": box, "camera": found.frame_id}
+        for found in images
         for hypotheses, box in zip(found.hypotheses, found.boxes_xyxy.tolist(), strict=True)
         if hypotheses
+    ]
+
+
+def _lost(boxes: "tuple[LostBox, ...]") -> list[dict[str, object]]:
+    return [
+        {
+            "class": one.name,
+            "confidence": one.score,
+            "xyxy": one.box_xyxy.tolist(),
+            "camera": one.camera,
+            "reason": one.reason,
+        }
+        for one in boxes
     ]
 
 

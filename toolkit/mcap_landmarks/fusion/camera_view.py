@@ -10,6 +10,7 @@ from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.geometry.frames import apply
 from mcap_landmarks.geometry.se2 import Array, exp, inverse, transform_points
 from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.images import CameraInfo
 
 _CLOCK_S, _VELOCITY_SHARE = 0.01, 0.1
 """Stamps of camera and odometry agree to so much, and between a scan and an image the robot turns as odometry says to
@@ -60,3 +61,16 @@ class SeenImage(NamedTuple):
 
     detections: Detections
     view: CameraView
+
+
+def camera_from_info(info: CameraInfo, *, rectified: bool) -> CameraModel:
+    """The camera of a CameraInfo, or of the images that were `rectified` with it.
+
+    Raises:
+        RecordingError: see `CameraModel.of`.
+    """
+    width, height = info.width_px or 2 * info.intrinsics[0, 2], info.height_px or 2 * info.intrinsics[1, 2]
+    size = (int(width), int(height))
+    if rectified:
+        return CameraModel.of("", size, info.projection[:, :3], np.zeros(0))
+    return CameraModel.of(info.distortion_model, size, info.intrinsics, info.distortion)

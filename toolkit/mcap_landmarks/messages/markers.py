@@ -6,6 +6,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from mcap_landmarks.geometry.angles import yaw_from_quaternion
 from mcap_landmarks.messages.annotations import Color
 from mcap_landmarks.messages.parts import (
     Array,
@@ -14,6 +15,7 @@ from mcap_landmarks.messages.parts import (
     point_from_ros,
     point_to_ros,
     pose_to_ros,
+    quaternion_from_ros,
     stamp_from_ros,
 )
 from mcap_landmarks.messages.typestore import RosObject
@@ -22,6 +24,7 @@ from mcap_landmarks.messages.typestore import RosObject
 class MarkerShape(IntEnum):
     """The marker types in use."""
 
+    CUBE = 1
     CYLINDER = 3
     LINE_STRIP = 4
     TEXT_VIEW_FACING = 9
@@ -29,7 +32,10 @@ class MarkerShape(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Marker:
-    """One shape at position_m (3,), of size_m (3,), optionally through points_m (N, 3); `name` and `number` key it."""
+    """One shape at position_m (3,), of size_m (3,), optionally through points_m (N, 3); `name` and `number` key it.
+
+    `yaw_rad` is the direction of its x axis.
+    """
 
     name: str
     number: int
@@ -39,6 +45,7 @@ class Marker:
     color: Color
     text: str = ""
     points_m: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    yaw_rad: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,6 +83,7 @@ _ALL = Marker("", 0, MarkerShape.CYLINDER, np.zeros(3), np.zeros(3), (0.0, 0.0, 
 
 def _to_ros(header: RosObject, marker: Marker, action: int = _ADD) -> RosObject:
     r, g, b, a = marker.color
+    turn = (0.0, 0.0, float(np.sin(marker.yaw_rad / 2)), float(np.cos(marker.yaw_rad / 2)))
     nothing = np.zeros(0, dtype=np.uint8)
     return make(
         "visualization_msgs/Marker",
@@ -84,7 +92,7 @@ def _to_ros(header: RosObject, marker: Marker, action: int = _ADD) -> RosObject:
         id=marker.number,
         type=int(marker.shape),
         action=action,
-        pose=pose_to_ros(marker.position_m, (0.0, 0.0, 0.0, 1.0)),
+        pose=pose_to_ros(marker.position_m, turn),
         scale=point_to_ros("geometry_msgs/Vector3", marker.size_m),
         color=make("std_msgs/ColorRGBA", r=r, g=g, b=b, a=a),
         lifetime=make("builtin_interfaces/Duration", sec=0, nanosec=0),
@@ -111,4 +119,5 @@ def _from_ros(ros: RosObject) -> Marker:
         (ros.color.r, ros.color.g, ros.color.b, ros.color.a),
         ros.text,
         np.array([point_from_ros(point) for point in ros.points], dtype=np.float64).reshape(-1, 3),
+        float(yaw_from_quaternion(quaternion_from_ros(ros.pose.orientation))),
     )

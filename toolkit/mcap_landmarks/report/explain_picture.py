@@ -1,38 +1,73 @@
 """The picture of an explanation: image with boxes, scan with clusters and objects, map around the candidates."""
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.patheffects import withStroke
 
 from mcap_landmarks.evaluation.explain import Place, Situation
 from mcap_landmarks.geometry.se2 import Array, transform_points
+from mcap_landmarks.report.cloud_picture import draw_cuboids, draw_from_above, draw_lost
 from mcap_landmarks.report.explain_reading import Picture, SensorData
+from mcap_landmarks.report.plots import draw_ellipses
 
 _GREY, _OBJECT, _CLUSTER, _BOX = "#9CA3AF", "#D55E00", "#0072B2", "#FACC15"
 _PLACES = ("#111827", "#7E22CE", "#047857", "#B45309", "#1D4ED8")
+_WIDE_IN = 12.0
+"""Width of a picture with images above a cloud, in inches: names of 7 points can be read on a screen."""
+_BELOW_IN = 5.9
+_IMAGE_OF_CLOUD = "detections (yellow), objects (coloured boxes), detections that are no object (red, dashed)"
 _AROUND_M = 6.0
 """So far around the landmarks of the candidates the map is drawn: enough to show what stands beside them."""
 
 
 def explanation_figure(situation: Situation, places: tuple[Place, ...], view: SensorData, title: str = "") -> Figure:
-    """As many panels as there is something to show: at least the objects around the robot."""
+    """As many panels as there is something to show: at least the objects around the robot.
+
+    Those of a planar scan are in a row; a cloud is below the images of all cameras, which are as wide as all.
+    """
     maps = situation.landmarks is not None and any(place.pose is not None for place in places)
-    count = 1 + len(view.pictures) + maps
-    result = Figure(figsize=(5.6 * count, 5.4), layout="constrained")
-    panels = iter(result.subplots(1, count, squeeze=False)[0])
-    for picture in view.pictures:
-        _draw_image(next(panels), situation, picture, "image" if len(view.pictures) == 1 else "")
-    _draw_objects(next(panels), situation, view)
+    images = [picture for picture in view.pictures if picture.pixels is not None]
+    if view.cloud is not None and images:
+        result, above, below = _image_grid(images, 1 + maps)
+    else:
+        count = len(images) + 1 + maps
+        result = Figure(figsize=(5.6 * count, 5.4), layout="constrained")
+        panels = result.subplots(1, count, squeeze=False)[0].tolist()
+        above, below = panels[: len(images)], panels[len(images) :]
+    for axes, picture in zip(above, images, strict=False):
+        _draw_image(axes, situation, picture, "image" if len(images) == 1 else "")
+    _draw_objects(below[0], situation, view)
     if maps:
-        _draw_map(next(panels), situation, places)
+        _draw_map(below[1], situation, places)
     if title:
         result.suptitle(title, x=0.01, ha="left", color="#111827", fontsize=11, fontweight="bold")
     return result
 
 
+def _image_grid(images: Sequence[Picture], count: int) -> tuple[Figure, list[Axes], list[Axes]]:
+    """A figure with a grid of images above, and so many panels in a row below it."""
+    columns = math.ceil(math.sqrt(len(images)))
+    rows = math.ceil(len(images) / columns)
+    ratio = max(picture.pixels.shape[0] / picture.pixels.shape[1] for picture in images if picture.pixels is not None)
+    tall = rows * float(np.clip(_WIDE_IN / columns * ratio, 2.5, 8.0)) + 0.5
+    result = Figure(figsize=(_WIDE_IN, tall + _BELOW_IN), layout="constrained")
+    above, below = result.subfigures(2, 1, squeeze=False, height_ratios=(tall, _BELOW_IN)).ravel()
+    above.suptitle(_IMAGE_OF_CLOUD, x=0.01, ha="left", fontsize=9)
+    panels = above.subplots(rows, columns, squeeze=False).ravel().tolist()
+    for axes in panels[len(images) :]:
+        axes.set_axis_off()
+    return result, panels, below.subplots(1, count, squeeze=False)[0].tolist()
+
+
 def _draw_image(axes: Axes, situation: Situation, picture: Picture, name: str) -> None:
     """An image with its boxes; without a name it gets that of its camera's frame."""
+    if picture.pixels is None:
+        return
     axes.imshow(picture.pixels)
     axes.set_axis_off()
     found = picture.detections
@@ -45,24 +80,47 @@ def _draw_image(axes: Axes, situation: Situation, picture: Picture, name: str) -
         axes.add_patch(Rectangle((x1, y1), x2 - x1, y2 - y1, fill=False, edgecolor=_BOX, linewidth=1.4))
         if options:
             text = f"{options[0][0]} {options[0][1]:.2f}"
-            axes.annotate(text, (x1, y1), (0, 2), textcoords="offset points", fontsize=7, color=_BOX)
+            axes.annotate(
+                text,
+                (x1, y1),
+                (0, 2),
+                textcoords="offset points",
+                fontsize=7,
+                color=_BOX,
+                path_effects=[withStroke(linewidth=1.5, foreground="#111827")],
+            )
+    if situation.scene is not None and situation.scene.boxes is not None and picture.view is not None:
+        draw_lost(axes, picture.lost or ())
+        draw_cuboids(axes, situation.scene, situation.scene.boxes, picture.view)
+        axes.set_xlim(0, picture.pixels.shape[1])
+        axes.set_ylim(picture.pixels.shape[0], 0)
 
 
 def _draw_objects(axes: Axes, situation: Situation, view: SensorData) -> None:
     """Points, clusters and objects in the base frame, x ahead."""
+    scene = situation.scene
+    if scene is not None and view.cloud is not None:
+        draw_from_above(axes, scene, view.cloud, view.views)
+        _draw_robot(axes)
+        _finish(axes, "from above [m], ahead is to the right; points above the ground, a colour per cluster")
+        return
     if view.scan_xy is not None:
         axes.plot(*view.scan_xy.T, ".", color=_GREY, markersize=2.5, label="scan")
     if situation.scan_objects is not None and len(situation.scan_objects):
         middles = np.array([points[-1] for points in situation.scan_objects.positions_xy if len(points)])
         axes.plot(*middles.T, "s", markerfacecolor="none", markeredgecolor=_CLUSTER, markersize=9, label="cluster")
-    scene = situation.scene
     if scene is not None and len(scene):
+        draw_ellipses(axes, scene.positions_xy, scene.covariances)
         axes.plot(*scene.positions_xy.T, "o", color=_OBJECT, markersize=5, label="object")
         for options, place in zip(scene.hypotheses, scene.positions_xy, strict=True):
             text = f"{options[0][0]} {options[0][1]:.2f}" if options else "?"
             axes.annotate(text, place, (5, 4), textcoords="offset points", fontsize=7, color="#374151")
-    axes.plot(0, 0, marker=(3, 0, -90), color="#111827", markersize=10, linestyle="", label="robot")
+    _draw_robot(axes)
     _finish(axes, "around the robot [m], x ahead")
+
+
+def _draw_robot(axes: Axes) -> None:
+    axes.plot(0, 0, marker=(3, 0, -90), color="#111827", markersize=10, linestyle="", label="robot", zorder=6)
 
 
 def _draw_map(axes: Axes, situation: Situation, places: tuple[Place, ...]) -> None:

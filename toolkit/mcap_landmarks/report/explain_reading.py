@@ -1,17 +1,19 @@
 """One bundle of a log with results and all that led to it, for an explanation."""
 
 import contextlib
-import dataclasses
 import json
-from collections.abc import Iterable
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import chain, islice
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.channels import (
     CAMERA_IMAGE,
+    CAMERA_INFO,
+    CLUSTERED_CLOUD,
     DETECTIONS,
     MAP,
     MATCH,
@@ -25,40 +27,68 @@ from mcap_landmarks.channels import (
 from mcap_landmarks.config import stage_config
 from mcap_landmarks.errors import MessageError, RecordingError, UsageError
 from mcap_landmarks.evaluation.explain import Situation
-from mcap_landmarks.geometry.frames import FrameTree, apply, rigid
+from mcap_landmarks.fusion.camera_view import CameraView, camera_from_info
+from mcap_landmarks.fusion.config import FuseConfig
+from mcap_landmarks.geometry.frames import FrameTree, apply, plain, rigid
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.inspection.topic_roles import Choice, cameras_of, choose, chosen_before, message_type
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, stage_records
+from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.codec import M, Message, decode
 from mcap_landmarks.messages.detections import Detections
-from mcap_landmarks.messages.images import CompressedImage, Image
+from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.recording.reader import Recording, open_recording
-from mcap_landmarks.stage import Channel, Connection
+from mcap_landmarks.report.box_outcomes import LostBox, lost_boxes
+from mcap_landmarks.stage import Channel, Config, Connection, RawMessage
 from mcap_landmarks.vision.pixels import rgb_from_message
+
+_C = TypeVar("_C", bound=Config)
 
 _AROUND_NS = 3 * 10**9
 _BESIDE_NS = 10**9
 """How far from the asked time the bundle may be, and from the bundle what its sensors saw."""
-_OF_BUNDLE = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, SCAN_OBJECTS)
-_BESIDE = (DETECTIONS, CAMERA_IMAGE, SCAN)
+_OF_BUNDLE = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, SCAN_OBJECTS, CLUSTERED_CLOUD)
+_BESIDE = (DETECTIONS, CAMERA_IMAGE, CAMERA_INFO, SCAN)
 
 
 class Picture(NamedTuple):
-    """The pixels (H, W, 3) of an image, and what was detected in it, if the log tells."""
+    """What one camera saw, as far as the log tells: the pixels (H, W, 3) of its image, and what was detected in it.
 
-    pixels: NDArray[np.uint8]
-    detections: Detections | None
+    Beside a cloud there are the view of the camera and the boxes that came to nothing, too.
+    """
+
+    pixels: NDArray[np.uint8] | None = None
+    detections: Detections | None = None
+    view: CameraView | None = None
+    lost: tuple[LostBox, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SensorData:
-    """What the sensors saw: the images of the detections, and the scan as points (N, 2) in the base frame."""
+    """What the sensors saw: every camera's image, and the scan as points (N, 2) in the base frame.
+
+    Of a cloud there are the points in clusters instead.
+    """
 
     pictures: tuple[Picture, ...] = ()
     scan_xy: Array | None = None
+    cloud: ClusteredCloud | None = None
+
+    @property
+    def views(self) -> tuple[CameraView, ...]:
+        """Those of all cameras whose place the log tells."""
+        return tuple(picture.view for picture in self.pictures if picture.view is not None)
+
+    @property
+    def lost(self) -> tuple[LostBox, ...] | None:
+        """The boxes of all cameras that came to nothing, None where that is unknown of one."""
+        told = [picture.lost for picture in self.pictures if picture.detections is not None]
+        known = [lost for lost in told if lost is not None]
+        return tuple(one for lost in known for one in lost) if known and len(known) == len(told) else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,6 +109,16 @@ class _Around:
         nearest = min(times, key=lambda key: abs(key[0] - time_ns), default=None)
         return None if nearest is None or abs(nearest[0] - time_ns) > _BESIDE_NS else messages[nearest]
 
+    def camera_info(self, detections: Detections) -> CameraInfo | None:
+        """The CameraInfo of the frame of some detections that is nearest to them; the only frame's may have another."""
+        infos, frame = self.messages[CAMERA_INFO], plain(detections.frame_id)
+        keys = [key for key in infos if key[1] == frame]
+        if not keys and len({camera for _, camera in infos}) == 1:
+            keys = [*infos]
+        nearest = min(keys, key=lambda key: abs(key[0] - detections.stamp_ns), default=None)
+        found = None if nearest is None else infos[nearest]
+        return found if isinstance(found, CameraInfo) else None
+
     def detections(self, time_ns: int) -> dict[str, Detections]:
         """The detections nearest to a time, by camera."""
         cameras = sorted({camera for _, camera in self.messages[DETECTIONS]})
@@ -98,11 +138,14 @@ def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
         channels = {c: channel for channel in (*_OF_BUNDLE, *_BESIDE) for c in _connections(recording, channel, choice)}
         found = _Around({channel: {} for channel in (*_OF_BUNDLE, *_BESIDE)})
         frames = cameras_of(recording, choice).frames()
-        for raw in recording.messages(channels, at_ns - _AROUND_NS, at_ns + _AROUND_NS):
+        around = recording.messages(channels, at_ns - _AROUND_NS, at_ns + _AROUND_NS)
+        for raw in chain(_first_infos(recording, channels), around):
             channel = channels[raw.connection]
             with contextlib.suppress(MessageError):
                 message = decode(message_type(channel, raw.connection), raw.data, _schema(raw.connection))
-                camera = message.frame_id if isinstance(message, Detections) else frames.get(raw.connection.topic, "")
+                camera = frames.get(raw.connection.topic, "")
+                if isinstance(message, Detections | CameraInfo):
+                    camera = plain(message.frame_id)
                 found.messages[channel][getattr(message, "stamp_ns", 0) or raw.log_time_ns, camera] = message
         bundles = found.messages[MATCH] or found.messages[SCENE_OBJECTS]
         if not bundles:
@@ -112,6 +155,13 @@ def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
             )
         stamp_ns = min((time_ns for time_ns, _ in bundles), key=lambda time_ns: abs(time_ns - at_ns))
         return _situation(recording, found, stamp_ns), _view(recording, found, stamp_ns)
+
+
+def _first_infos(recording: Recording, channels: Mapping[Connection, Channel[Message]]) -> Iterator[RawMessage]:
+    """The first CameraInfo of every camera: calibrations may come only once."""
+    for connection, channel in channels.items():
+        if channel == CAMERA_INFO:
+            yield from islice(recording.messages([connection]), 1)
 
 
 def _situation(recording: Recording, found: _Around, stamp_ns: int) -> Situation:
@@ -125,19 +175,17 @@ def _situation(recording: Recording, found: _Around, stamp_ns: int) -> Situation
         None if spread is None else spread.planar_covariance,
         found.at(SCAN_OBJECTS, stamp_ns),
         tuple(found.detections(stamp_ns).values()),
-        _config(recording),
+        _config(recording, LocalizeConfig, "localize"),
     )
 
 
-def _config(recording: Recording) -> LocalizeConfig:
-    """What localize ran with, as the log tells; the defaults for what it does not tell, or tells in other words."""
-    told = json.loads(recording.metadata.get(RUN, {}).get("config", "{}")).get("localize", {})
-    names = {field.name for field in dataclasses.fields(LocalizeConfig)}
+def _config(recording: Recording, config: type[_C], stage: str) -> _C:
+    """What a stage ran with, as the log tells; the defaults for what it does not tell, or tells in other words."""
+    told = json.loads(recording.metadata.get(RUN, {}).get("config", "{}")).get(stage, {})
+    names = set(config.__dataclass_fields__)
     with contextlib.suppress(UsageError):
-        made = stage_config(LocalizeConfig, "localize", {name: told[name] for name in names & set(told)})
-        assert isinstance(made, LocalizeConfig)  # noqa: S101 - that is what was asked for
-        return made
-    return LocalizeConfig()
+        return stage_config(config, stage, {name: told[name] for name in names & set(told)})
+    return config()
 
 
 def _schema(connection: Connection) -> str:
@@ -145,17 +193,49 @@ def _schema(connection: Connection) -> str:
 
 
 def _view(recording: Recording, found: _Around, stamp_ns: int) -> SensorData:
-    pictures, detections = list[Picture](), found.detections(stamp_ns)
-    for camera in sorted({camera for _, camera in found.messages[CAMERA_IMAGE]}):
-        boxes = detections.get(camera) if camera else next(iter(detections.values()), None)
-        image = found.nearest(CAMERA_IMAGE, stamp_ns if boxes is None else boxes.stamp_ns, camera)
-        if isinstance(image, CompressedImage | Image):
-            with contextlib.suppress(MessageError):
-                pictures.append(Picture(rgb_from_message(image), boxes))
-    scene, scan = found.at(SCENE_OBJECTS, stamp_ns), found.at(SCAN, stamp_ns)
+    pictures = _pictures(found, stamp_ns)
+    scene, cloud = found.at(SCENE_OBJECTS, stamp_ns), found.at(CLUSTERED_CLOUD, stamp_ns)
+    if scene is not None and cloud is not None:
+        pictures = [_beside_cloud(recording, found, picture, scene, cloud) for picture in pictures]
+        return SensorData(tuple(pictures), cloud=cloud)
+    scan = found.at(SCAN, stamp_ns)
     if scan is None or scene is None:
         return SensorData(tuple(pictures))
     return SensorData(tuple(pictures), _points(recording, scan, scene.frame_id))
+
+
+def _pictures(found: _Around, stamp_ns: int) -> list[Picture]:
+    """What every camera saw: those that there are images of, and then those that there are boxes of only."""
+    pictures, detections = list[Picture](), found.detections(stamp_ns)
+    for camera in sorted({camera for _, camera in found.messages[CAMERA_IMAGE]}):
+        boxes = detections.pop(camera or next(iter(detections), ""), None)
+        image = found.nearest(CAMERA_IMAGE, stamp_ns if boxes is None else boxes.stamp_ns, camera)
+        pixels = None
+        if isinstance(image, CompressedImage | Image):
+            with contextlib.suppress(MessageError):
+                pixels = rgb_from_message(image)
+        pictures.append(Picture(pixels, boxes))
+    return [*pictures, *(Picture(None, boxes) for boxes in detections.values())]
+
+
+def _beside_cloud(
+    recording: Recording, found: _Around, picture: Picture, scene: SceneObjects, cloud: ClusteredCloud
+) -> Picture:
+    """The same with the view of the camera and the boxes that came to nothing, where the log tells enough of them.
+
+    The way that the robot makes between scan and image is left out: it matters little to a picture.
+    """
+    detections = picture.detections
+    info = None if detections is None else found.camera_info(detections)
+    if detections is None or info is None:
+        return picture
+    config = _config(recording, FuseConfig, "fuse")
+    with contextlib.suppress(RecordingError):
+        base_from_camera = _frames(recording).lookup(scene.frame_id, info.frame_id or detections.frame_id)
+        camera = camera_from_info(info, rectified=config.rectified)
+        view = CameraView.at(camera, base_from_camera, np.zeros(3), 0.0)
+        return picture._replace(view=view, lost=lost_boxes(detections, scene, cloud, view, config))
+    return picture
 
 
 def _points(recording: Recording, scan: LaserScan, base: str) -> Array:
@@ -164,18 +244,22 @@ def _points(recording: Recording, scan: LaserScan, base: str) -> Array:
     rows = np.flatnonzero(inside)
     angle, range_m = scan.angle_min_rad + rows * scan.angle_increment_rad, scan.ranges_m[rows].astype(np.float64)
     points = np.column_stack([range_m * np.cos(angle), range_m * np.sin(angle), np.zeros(len(rows))])
-    edges = [
+    with contextlib.suppress(RecordingError):
+        points = apply(_frames(recording).lookup(base, scan.frame_id), points)
+    return points[:, :2]
+
+
+def _frames(recording: Recording) -> FrameTree:
+    """The log's frames that stand still to each other."""
+    return FrameTree.of(
         (step.frame_id, step.child_frame_id, rigid(step.translation_m, step.rotation_xyzw))
         for connection in recording.connections(TF_STATIC.topic)
         for raw in recording.messages([connection])
         for step in decode(TF_STATIC.message, raw.data).transforms
-    ]
-    with contextlib.suppress(RecordingError):
-        points = apply(FrameTree.of(edges).lookup(base, scan.frame_id), points)
-    return points[:, :2]
+    )
 
 
-def _connections(recording: Recording, channel: Channel[Message], choice: Choice) -> Iterable[Connection]:
+def _connections(recording: Recording, channel: Channel[Message], choice: Choice) -> tuple[Connection, ...]:
     """The connections that play a channel's part; none where several could, since one too many would mislead."""
     try:
         return choose(recording, channel, choice)

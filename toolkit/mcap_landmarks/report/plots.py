@@ -102,7 +102,7 @@ def _draw_map(axes: Axes, drawing: Drawing) -> None:
     scene, objects = drawing.landmarks, drawing.objects
     if scene is not None:
         _draw_classes(axes, scene.classes, scene.positions_xy)
-        _draw_ellipses(axes, scene.positions_xy, scene.covariances)
+        draw_ellipses(axes, scene.positions_xy, scene.covariances)
         _draw_groups(axes, drawing.groups, dict(zip(scene.ids, scene.positions_xy, strict=True)))
     if objects is not None and len(objects):
         x, y = objects.positions_xy.T
@@ -127,7 +127,8 @@ def _draw_groups(axes: Axes, groups: tuple[Group, ...], place: dict[str, Array])
     axes.plot(x, y, ".", color=_GROUP, markersize=4, label="robot at a group", zorder=4)
 
 
-def _draw_ellipses(axes: Axes, positions_xy: Array, covariances: Array) -> None:
+def draw_ellipses(axes: Axes, positions_xy: Array, covariances: Array) -> None:
+    """The 95 % regions of positions (N, 2), where their covariances (N, 2, 2) are known."""
     known = covariances.any(axis=(1, 2))
     if not known.any():
         return

@@ -18,7 +18,7 @@ from mcap_landmarks.channels import (
     TF_STATIC,
 )
 from mcap_landmarks.errors import RecordingError, UsageError
-from mcap_landmarks.fusion.camera_view import CameraView, SeenImage
+from mcap_landmarks.fusion.camera_view import CameraView, SeenImage, camera_from_info
 from mcap_landmarks.fusion.cloud_fuser import CloudFuser
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.fuser import Fuser
@@ -26,7 +26,6 @@ from mcap_landmarks.fusion.object_motions import ObjectMotions
 from mcap_landmarks.fusion.scene_markers import markers_from_scene
 from mcap_landmarks.fusion.selection import at_least, usable, wanted
 from mcap_landmarks.fusion.thesis import fuse_in_order
-from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.detections import Detections
@@ -102,7 +101,8 @@ class _Cameras:
         base_from_camera = self.mounting.lookup(bundle, base, info.frame_id or detections.frame_id)
         velocity = np.zeros(3) if bundle.odometry is None else bundle.odometry.velocity
         late_s = ((detections.stamp_ns or bundle.stamp_ns) - bundle.stamp_ns) / 1e9
-        return SeenImage(detections, CameraView.at(_camera(info, self.config), base_from_camera, velocity, late_s))
+        camera = camera_from_info(info, rectified=self.config.rectified)
+        return SeenImage(detections, CameraView.at(camera, base_from_camera, velocity, late_s))
 
     def _info(self, bundle: Bundle, frame_id: str) -> CameraInfo:
         """The CameraInfo of a frame; one camera's may be of another than its images."""
@@ -136,14 +136,6 @@ def _fused(
     if cloud is not None and cloud.stamp_ns == objects.stamp_ns:
         return fusers.clouds.add(cloud, images, odometry)
     return fusers.planar.add(objects, images, odometry)
-
-
-def _camera(info: CameraInfo, config: FuseConfig) -> CameraModel:
-    width, height = info.width_px or 2 * info.intrinsics[0, 2], info.height_px or 2 * info.intrinsics[1, 2]
-    size = (int(width), int(height))
-    if config.rectified:
-        return CameraModel.of("", size, info.projection[:, :3], np.zeros(0))
-    return CameraModel.of(info.distortion_model, size, info.intrinsics, info.distortion)
 
 
 STAGE = Stage(
