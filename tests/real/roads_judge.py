@@ -19,7 +19,8 @@ from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.stage import Channel
 from scipy.optimize import linear_sum_assignment
 
-from tests.real.roads import CLOUD, Frame, Label, base_from_lidar, write_log
+from docs.kitti import CLOUD, base_from_lidar, write_log
+from tests.real.roads import Label, Labelled
 
 FITTING = {
     "Car": {"car"},
@@ -76,7 +77,7 @@ class Judged:
         return int((self.errors_m <= most_m).sum())
 
 
-def judge_frames(data: Path, content: Sequence[Frame]) -> Judged:
+def judge_frames(data: Path, content: Sequence[Labelled]) -> Judged:
     """Frames through the command line with the stock YOLOv5n of a folder of data, judged."""
     with tempfile.TemporaryDirectory() as folder:
         log, out = Path(folder) / "log.mcap", Path(folder) / "out.mcap"
@@ -99,7 +100,7 @@ def read(path: Path, channel: Channel[M]) -> list[M]:
         return [decode(channel.message, raw.data) for raw in raws]
 
 
-def judge(content: Iterable[tuple[Frame, Detections, SceneObjects]]) -> Judged:
+def judge(content: Iterable[tuple[Labelled, Detections, SceneObjects]]) -> Judged:
     """Hold the detections and scenes of frames against their labels."""
     cases: list[Case] = []
     wrong: list[tuple[int, str, float, float]] = []
@@ -112,7 +113,7 @@ def judge(content: Iterable[tuple[Frame, Detections, SceneObjects]]) -> Judged:
     return Judged(tuple(cases), objects, tuple(wrong))
 
 
-def _cases(frame: Frame, labels: Sequence[Label], detections: Detections, scene: SceneObjects) -> Iterable[Case]:
+def _cases(frame: Labelled, labels: Sequence[Label], detections: Detections, scene: SceneObjects) -> Iterable[Case]:
     detected = [label for label in labels if label.name in FITTING and _is_detected(label, detections)]
     cost = np.full((len(detected), len(scene)), 1e6)
     for i, label in enumerate(detected):
@@ -144,7 +145,7 @@ def _iou(one: Array, other: Array) -> float:
     return shared / float(np.prod(one[2:] - one[:2]) + np.prod(other[2:] - other[:2]) - shared)
 
 
-def _wrong(frame: Frame, labels: Sequence[Label], scene: SceneObjects) -> Iterable[tuple[int, str, float, float]]:
+def _wrong(frame: Labelled, labels: Sequence[Label], scene: SceneObjects) -> Iterable[tuple[int, str, float, float]]:
     """Scene objects that are near no labelled object and in no region that nobody labelled."""
     camera_from_base = frame.camera_from_lidar @ frames.inverse(base_from_lidar())
     ignored = [label.box_xyxy for label in frame.labels if label.name == "DontCare"]
