@@ -130,6 +130,20 @@ def test_held_messages_are_the_latest_so_far_and_transforms_gather() -> None:
     assert held[1] is not held[2]
 
 
+def test_a_bundle_that_waits_gets_no_calibration_of_later_ones() -> None:
+    """A log of single frames has a camera of its own in each; the first is there for what came before it."""
+    infos = [(CAMERA_INFO, at * SECOND, info(at * SECOND)) for at in (20, 40, 60)]
+    scenes = [(SCENE_OBJECTS, at * SECOND, scene(at * SECOND)) for at in (10, 20, 40, 60)]
+    messages = sorted([*infos, *scenes], key=lambda entry: entry[1])
+    found = associate(messages, SCENE_OBJECTS, Association(), with_odometry=True, held=[CAMERA_INFO])
+    held = [bundle.get(CAMERA_INFO) for bundle in found]
+    assert [message and message.stamp_ns // SECOND for message in held] == [20, 20, 40, 60]
+
+
+def info(stamp_ns: int) -> CameraInfo:
+    return CameraInfo(stamp_ns, "camera", 480, 640, "", np.zeros(5), np.eye(3), np.eye(3), np.eye(3, 4))
+
+
 def mounts(**heights_m: float) -> TFMessage:
     level = np.array([0.0, 0.0, 0.0, 1.0])
     steps = [Transform(0, "base", name, np.array([0.0, 0.0, z]), level) for name, z in heights_m.items()]

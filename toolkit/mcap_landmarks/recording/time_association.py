@@ -48,11 +48,12 @@ def associate(
     """One bundle per message of the channel `primary`, with odometry interpolated at its stamp if that is wanted.
 
     `messages` are (channel, log time, message) by log time; every `Odometry` among them is taken as the robot's.
-    Stamps are the headers', log time where those are zero. Of a `held` channel a bundle gets the latest message so far,
-    of transforms the latest of every frame. Of a channel `beside` it gets the message nearest to its stamp, within
-    `BESIDE_NS`, among those that are nearer to no other bundle. Of the channels `by_frame` it gets one such message of
-    each frame; there will be as many frames as the number says, or more. A bundle waits for what is still to come, at
-    most `WINDOW_NS` of log time; then it goes without. `counts` is kept up to date.
+    Stamps are the headers', log time where those are zero. Of a `held` channel a bundle gets the latest message that
+    came at most `BESIDE_NS` after it, else the first; of transforms the latest of every frame so far. Of a channel
+    `beside` it gets the message nearest to its stamp, within `BESIDE_NS`, among those that are nearer to no other
+    bundle. Of the channels `by_frame` it gets one such message of each frame; there will be as many frames as the
+    number says, or more. A bundle waits for what is still to come, at most `WINDOW_NS` of log time; then it goes
+    without. `counts` is kept up to date.
     """
     table = _Table(primary, counts, with_odometry, (held, beside), by_frame)
     for channel, log_time_ns, message in messages:
@@ -85,7 +86,7 @@ class _Table:
             self._waiting.append(Bundle(stamp_ns, log_time_ns, {channel: message}))
             self._stamps.append(stamp_ns)
         elif channel in self._held:
-            self._held[channel].setdefault(self._frame(channel, message), _Held()).take(message)
+            self._held[channel].setdefault(self._frame(channel, message), _Held()).take(log_time_ns, message)
         elif channel in self._beside:
             partners = self._beside[channel].setdefault(self._frame(channel, message), _Beside())
             partners.messages.append((stamp_ns, message))
@@ -114,7 +115,7 @@ class _Table:
         stamp_ns = bundle.stamp_ns
         if self._odometry is not None and self._odometry.latest_ns < stamp_ns + self._duration_ns(bundle):
             return False
-        frames_of = {channel: len(self._latest(channel)) for channel in self._held}
+        frames_of = {channel: sum(map(bool, frames.values())) for channel, frames in self._held.items()}
         frames_of |= {channel: len(frames) for channel, frames in self._beside.items()}
         if any(count < self._by_frame.get(channel, 1) for channel, count in frames_of.items()):
             return False
@@ -136,23 +137,23 @@ class _Table:
             duration_ns = self._duration_ns(bundle)
             if odometry is not None and duration_ns:
                 odometry = replace(odometry, samples=self._odometry.around(bundle.stamp_ns, duration_ns))
-        found = self._others(bundle.stamp_ns)
+        found = self._others(bundle)
         firsts = {channel: messages[0] for channel, messages in found.items()}
         several = {channel: messages for channel, messages in found.items() if len(messages) > 1}
         while self._stamps[0] < bundle.stamp_ns - 2 * BESIDE_NS:
             self._stamps.popleft()
         return Bundle(bundle.stamp_ns, bundle.log_time_ns, {**bundle.messages, **firsts}, odometry, several)
 
-    def _others(self, stamp_ns: int) -> dict[Channel[Message], tuple[Message, ...]]:
-        """The messages of all channels but the primary one that go with a bundle's stamp; no channel without any."""
-        found = {channel: self._latest(channel) for channel in self._held}
-        found |= {channel: self._partners(channel, stamp_ns) for channel in self._beside}
+    def _others(self, bundle: Bundle) -> dict[Channel[Message], tuple[Message, ...]]:
+        """The messages of all channels but the primary one that go with a bundle; no channel without any."""
+        found = {channel: self._holding(channel, bundle.log_time_ns) for channel in self._held}
+        found |= {channel: self._partners(channel, bundle.stamp_ns) for channel in self._beside}
         self._counts.alone.update(channel.topic for channel in self._beside if not found[channel])
         return {channel: tuple(messages) for channel, messages in found.items() if messages}
 
-    def _latest(self, channel: Channel[Message]) -> list[Message]:
-        """The latest message of a held channel, of each frame where it has several."""
-        return [held.latest for _, held in sorted(self._held[channel].items()) if held.latest is not None]
+    def _holding(self, channel: Channel[Message], log_time_ns: int) -> list[Message]:
+        """The message of a held channel that holds at a log time, of each frame where it has several."""
+        return [held.at(log_time_ns) for _, held in sorted(self._held[channel].items()) if held]
 
     def _partners(self, channel: Channel[Message], stamp_ns: int) -> list[Message]:
         """The messages of a channel that belong beside a bundle, one of each frame that has any."""
@@ -166,24 +167,29 @@ class _Table:
 
 
 class _Held:
-    """The latest message of a channel; of transforms, one message with the latest of every frame."""
+    """Messages of a channel that hold from their log times on; of transforms, one with the latest of every frame."""
 
     def __init__(self) -> None:
-        self._message: Message | None = None
+        self._messages: deque[tuple[int, Message]] = deque()
         self._transforms: dict[str, Transform] = {}
 
-    def take(self, message: Message) -> None:
+    def __bool__(self) -> bool:
+        return bool(self._messages or self._transforms)
+
+    def take(self, log_time_ns: int, message: Message) -> None:
         if isinstance(message, TFMessage):
             self._transforms.update({step.child_frame_id: step for step in message.transforms})
-            self._message = None
+            self._messages.clear()
         else:
-            self._message = message
+            self._messages.append((log_time_ns, message))
 
-    @property
-    def latest(self) -> Message | None:
-        if self._message is None and self._transforms:
-            self._message = TFMessage(tuple(self._transforms.values()))
-        return self._message
+    def at(self, log_time_ns: int) -> Message:
+        """The latest message that came not much later than a log time, else the first; times never go back."""
+        if not self._messages:
+            self._messages.append((log_time_ns, TFMessage(tuple(self._transforms.values()))))
+        while len(self._messages) > 1 and self._messages[1][0] <= log_time_ns + BESIDE_NS:
+            self._messages.popleft()
+        return self._messages[0][1]
 
 
 class _Beside:

@@ -18,7 +18,7 @@ from mcap_landmarks.recording.time_association import Association, associate
 from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage, Readable
 
 HELD = (CAMERA_INFO, TF_STATIC)
-"""Channels of which a bundle gets the latest message so far, however old."""
+"""Channels of which a bundle gets the latest message that came not much later, however old."""
 _OF_CAMERAS = (CAMERA_INFO, DETECTIONS)
 """Channels of which a bundle gets a message for every camera."""
 
