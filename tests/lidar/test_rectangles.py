@@ -34,7 +34,7 @@ def off_parallel(yaw_rad: float, other_rad: float) -> float:
 def test_the_hugging_rectangle_follows_an_l(yaw_deg: float) -> None:
     solid = Solid(10.0, 4.0, 4.0, 1.8, 1.5, np.deg2rad(yaw_deg))
     points = seen(solid)
-    found = hugging(points)
+    (found,) = hugging([points])
     assert min(off_parallel(found.yaw_rad, solid.yaw_rad + turn) for turn in (0, np.pi / 2)) < np.deg2rad(5)
     assert found.holds(points, 0.1).mean() > 0.9  # a twentieth is trimmed at every end
     assert found.length_m < 4.3

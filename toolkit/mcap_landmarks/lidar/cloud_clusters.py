@@ -1,8 +1,9 @@
 """Points of a cloud that are of one thing: connected cells, which grow with the distance as a cloud's gaps do."""
 
+from itertools import product
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
@@ -15,6 +16,9 @@ _TALL_M, _TALL_SHARE = 0.4, 0.02
 _TIERS = 10
 """So many cells stand on each other: all that is higher counts as the topmost."""
 _FARTHEST_M = 120.0
+
+_ONWARDS = np.array([step for step in product((0, 1), (-1, 0, 1), (-1, 0, 1)) if step > (0, 0, 0)])
+"""Steps to half of a cell's neighbours by sector, ring and tier; the others step to it."""
 
 BACKGROUND = -1
 """The label of points that are of no cluster."""
@@ -47,20 +51,27 @@ def cloud_clusters(
 
 
 def _connected(filled: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """Cells' labels from 1 on, 0 where nothing is; the last sector is beside the first one."""
-    labels, count = ndimage.label(filled, structure=np.ones((3, 3, 3)))
-    last, first = labels[-1], labels[0]
-    beyond = np.pad(first, 1)
-    pairs = []
-    for step_in in range(3):
-        for step_up in range(3):
-            other = beyond[step_in : step_in + first.shape[0], step_up : step_up + first.shape[1]]
-            meet = (last > 0) & (other > 0)
-            pairs.append(np.stack([last[meet], other[meet]]))
-    rows, columns = np.hstack(pairs)
-    _, joined = connected_components(coo_matrix((np.ones(len(rows)), (rows, columns)), (count + 1, count + 1)))
-    joined = np.where(np.arange(count + 1) > 0, joined + 1, 0).astype(np.int32)
-    return np.asarray(joined[labels], dtype=np.int32)
+    """Cells' labels from 1 on, in their order, 0 where nothing is; the last sector is beside the first one.
+
+    Few cells are filled, so that a graph of these is quicker to walk than all of them.
+    """
+    sectors, rings, tiers = filled.shape
+    numbers = np.zeros((sectors + 1, rings + 2, tiers + 2), dtype=np.int32)
+    count = int(np.count_nonzero(filled))
+    numbers[:-1, 1:-1, 1:-1][filled] = np.arange(1, count + 1, dtype=np.int32)
+    numbers[-1] = numbers[0]
+    flat, own = numbers.reshape(-1), np.flatnonzero(numbers[:-1])
+    rows, columns = [], []
+    for step in _ONWARDS @ [(rings + 2) * (tiers + 2), tiers + 2, 1]:
+        beside = flat[own + step]
+        meet = np.flatnonzero(beside)
+        rows.append(meet)
+        columns.append(beside[meet] - 1)
+    edges = np.concatenate(rows), np.concatenate(columns)
+    _, of_number = connected_components(coo_matrix((np.ones(len(edges[0])), edges), (count, count)), directed=False)
+    labels = np.zeros(filled.shape, dtype=np.int32)
+    labels[filled] = of_number + 1
+    return labels
 
 
 def _by_size(labels: NDArray[np.int32], fewest: int) -> tuple[NDArray[np.int32], int]:

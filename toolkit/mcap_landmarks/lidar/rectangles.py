@@ -1,6 +1,8 @@
 """Rectangles seen from above: the one that hugs points, and the one of a known size whose sides they lie on."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +10,8 @@ from numpy.typing import NDArray
 from mcap_landmarks.classes import Cuboid
 from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array
+
+_F = TypeVar("_F", bound=np.floating)
 
 _TURNS = 30
 """Directions of the sides that are tried in a quarter turn: every 3 degrees, as well as a side can be told."""
@@ -90,33 +94,49 @@ class BoxEdges:
 
 
 def closeness(points_xy: Array, turns: int, most: int) -> tuple[Array, Array, Array]:
-    """How well the sides of the rectangle that hugs points (N, 2) follow them, by its direction.
+    """How well the sides of the rectangle that hugs points (..., N, 2) follow them, by its direction.
 
-    Returns directions (T,) from 0 to 90 degrees, the mean closeness (T,) of points to the nearest side, from 0 to 1,
-    and the extents (T, 2, 2), least and largest along and across. `turns` directions are looked at, and `most` points,
-    evenly thinned. This is the search for an L-shape by the closeness
-    criterion of Zhang, Xu, Dong and Dolan, Efficient L-shape fitting for vehicle detection using laser scanners, IV
-    2017 (algorithms 2 and 4), for all directions at once.
+    Returns directions (T,) from 0 to 90 degrees, the mean closeness (..., T) of points to the nearest side, from 0 to
+    1, and the extents (..., T, 2, 2), least and largest along and across. `turns` directions are looked at, and `most`
+    points, evenly thinned. This is the search for an L-shape by the closeness criterion of Zhang, Xu, Dong and Dolan,
+    Efficient L-shape fitting for vehicle detection using laser scanners, IV 2017 (algorithms 2 and 4), for all
+    directions at once.
     """
-    points = points_xy if len(points_xy) <= most else points_xy[_evenly(len(points_xy), most)]
+    points = _thinned(points_xy, most)
+    count = points.shape[-2]
     yaws: Array = np.arange(turns, dtype=np.float64) * (np.pi / 2 / turns)
     c, s = np.cos(yaws)[:, None], np.sin(yaws)[:, None]
-    sides = np.stack([c * points[:, 0] + s * points[:, 1], c * points[:, 1] - s * points[:, 0]], axis=1)
-    ordered = np.sort(sides, axis=2)
-    trim = int(_TRIM * len(points))
-    low, high = ordered[..., trim, None], ordered[..., len(points) - 1 - trim, None]
+    x, y = points[..., None, :, 0], points[..., None, :, 1]
+    sides = np.stack([c * x + s * y, c * y - s * x], axis=-2)
+    ordered = np.sort(sides, axis=-1)
+    trim = int(_TRIM * count)
+    low, high = ordered[..., trim, None], ordered[..., count - 1 - trim, None]
     below, above = np.abs(sides - low), np.abs(high - sides)
-    nearer = np.square(below).sum(axis=2) <= np.square(above).sum(axis=2)
-    off = np.where(nearer[..., None], below, above).min(axis=1)
-    close: Array = (_NEAREST_M / np.maximum(off, _NEAREST_M)).mean(axis=1)
-    return yaws, close, np.concatenate([low, high], axis=2)
+    nearer = np.square(below).sum(axis=-1) <= np.square(above).sum(axis=-1)
+    off = np.where(nearer[..., None], below, above).min(axis=-2)
+    close: Array = (_NEAREST_M / np.maximum(off, _NEAREST_M)).mean(axis=-1)
+    return yaws, close, np.concatenate([low, high], axis=-1)
 
 
-def hugging(points_xy: Array) -> Rectangle:
-    """The rectangle that hugs points (N, 2), its length the longer side; the covariance is that of the points' mean."""
-    yaws, close, ends = closeness(points_xy, _FEW_TURNS, _FEW_POINTS)
-    best = int(np.argmax(close))
-    (low, high), yaw = ends[best].T, float(yaws[best])
+def hugging(things: Sequence[NDArray[np.floating]]) -> list[Rectangle]:
+    """The rectangles that hug the points (N, 2) of things, their length the longer side.
+
+    Covariances are those of the points' means. Things with as many points are looked at together, which is faster.
+    """
+    thinned = [_thinned(points_xy, _FEW_POINTS).astype(np.float64) for points_xy in things]
+    counts = np.array([len(points) for points in thinned])
+    found: dict[int, Rectangle] = {}
+    for count in np.unique(counts):
+        alike = np.flatnonzero(counts == count).tolist()
+        yaws, close, ends = closeness(np.stack([thinned[i] for i in alike]), _FEW_TURNS, _FEW_POINTS)
+        best = np.argmax(close, axis=-1)
+        found.update({i: _hugging(float(yaws[k]), own[k]) for i, k, own in zip(alike, best, ends, strict=True)})
+    return [found[i] for i in range(len(things))]
+
+
+def _hugging(yaw: float, ends: Array) -> Rectangle:
+    """The rectangle in a direction with extents (2, 2), least and largest along and across."""
+    low, high = ends.T
     size, middle = high - low, (low + high) / 2
     c, s = np.cos(yaw), np.sin(yaw)
     centre = np.array([c * middle[0] - s * middle[1], s * middle[0] + c * middle[1]])
@@ -238,5 +258,9 @@ def _half_turn(yaw_rad: float) -> float:
     return float((yaw_rad + np.pi / 2) % np.pi - np.pi / 2)
 
 
-def _evenly(count: int, most: int) -> NDArray[np.intp]:
-    return np.linspace(0, count - 1, most).round().astype(np.intp)
+def _thinned(points_xy: NDArray[_F], most: int) -> NDArray[_F]:
+    """At most so many of points (..., N, 2), evenly spread over their order."""
+    count = points_xy.shape[-2]
+    if count <= most:
+        return points_xy
+    return points_xy[..., np.linspace(0, count - 1, most).round().astype(np.intp), :]

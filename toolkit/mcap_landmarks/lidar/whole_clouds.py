@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,7 +49,8 @@ def points_in_base(
 
     `base_from_then` says where the base was at times (N,) in ns; `stamp_ns` stands in where the cloud has no stamp.
     """
-    returned = np.isfinite(cloud.points_m).all(axis=1)
+    x, y, z = cloud.points_m.T
+    returned = np.isfinite(x) & np.isfinite(y) & np.isfinite(z)
     points = frames.apply(base_from_lidar, cloud.points_m[returned])
     if base_from_then is not None and cloud.times_ns is not None and len(points):
         moved = base_from_then((cloud.stamp_ns or stamp_ns) + cloud.times_ns[returned])
@@ -71,17 +71,33 @@ def whole_cloud(points_m: Array, lidar_xy: Array, config: ClusterConfig) -> Whol
     clusters, count = cloud_clusters(away, heights, config.fewest_points)
     known = clusters != BACKGROUND
     points, heights, clusters = points[known], heights[known], clusters[known]
+    largest = _LARGEST_M if config.largest_m is None else config.largest_m
+    return WholeCloud(points, heights, clusters, _objects(points, heights, clusters, count, largest))
+
+
+def _objects(
+    points_m: Floats, heights_m: Floats, clusters: NDArray[np.int32], count: int, largest_m: float
+) -> tuple[CloudObject, ...]:
+    """The objects that clusters (N,) from 0 to `count` are, without those that are larger than objects are."""
+    if not count:
+        return ()
     order = np.argsort(clusters, kind="stable")
     starts = np.searchsorted(clusters[order], np.arange(count + 1))
-    largest = _LARGEST_M if config.largest_m is None else config.largest_m
-    owned = [order[first:last] for first, last in pairwise(starts)]
-    found = [_object(i, points[own], heights[own], largest) for i, own in enumerate(owned)]
-    return WholeCloud(points, heights, clusters, tuple(one for one in found if one is not None))
+    points, floors = points_m[order], (points_m[:, 2] - heights_m)[order]
+    low, high = np.minimum.reduceat(points, starts[:-1]), np.maximum.reduceat(points, starts[:-1])
+    small = np.flatnonzero(np.hypot(*(high - low)[:, :2].T) <= largest_m).tolist()
+    owned = {i: slice(starts[i], starts[i + 1]) for i in small}
+    rectangles = hugging([points[own, :2] for own in owned.values()])
+    return tuple(
+        CloudObject(i, rectangle, _median(floors[owned[i]]), float(high[i, 2]))
+        for i, rectangle in zip(owned, rectangles, strict=True)
+    )
 
 
-def _object(cluster: int, points_m: Floats, heights_m: Floats, largest_m: float) -> CloudObject | None:
-    """The object that a cluster is, None if it is larger than objects are."""
-    if np.hypot(*np.ptp(points_m[:, :2], axis=0)) > largest_m:
-        return None
-    foot = float(np.median(points_m[:, 2] - heights_m))
-    return CloudObject(cluster, hugging(points_m[:, :2].astype(np.float64)), foot, float(points_m[:, 2].max()))
+def _median(values: Floats) -> float:
+    """The median of values (N,): NumPy's own takes ten times as long for the few that clusters have."""
+    middle = len(values) // 2
+    if len(values) % 2:
+        return float(np.partition(values, middle)[middle])
+    ordered = np.partition(values, [middle - 1, middle])
+    return float((ordered[middle - 1] + ordered[middle]) / np.float32(2))
