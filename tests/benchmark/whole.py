@@ -30,9 +30,9 @@ def measure(quick: bool) -> Iterator[Row]:
         database, out = folder / "map.db", folder / "out.mcap"
         rounds = []
         for _ in range(1 if quick else _ROUNDS):
-            mapped_s = _seconds("map", logs[0], "--map", database, "--force")
-            localized_s = _seconds("localize", logs[1], "--map", database, "-o", out, "--force")
-            rounds.append((mapped_s, localized_s, _seconds("evaluate", out, "--align")))
+            mapped_s = seconds("map", logs[0], "--map", database, "--force")
+            localized_s = seconds("localize", logs[1], "--map", database, "-o", out, "--force")
+            rounds.append((mapped_s, localized_s, seconds("evaluate", out, "--align")))
         map_s, localize_s, evaluate_s = (statistics.median(seconds) for seconds in zip(*rounds, strict=True))
         scores = call("evaluate", out, "--align")
     peers = {"log": lasts_s, "localize": localize_s, "evaluate": evaluate_s, "map of another log": map_s}
@@ -48,7 +48,7 @@ def measure(quick: bool) -> Iterator[Row]:
     yield Row("small: positions, RMSE aligned", scores["position"]["rmse_m"], "m", cases=scores["localized"])
 
 
-def _seconds(*words: object) -> float:
+def seconds(*words: object) -> float:
     """Wall-clock time of a verb in a process of its own.
 
     Raises:

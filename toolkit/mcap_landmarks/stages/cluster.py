@@ -1,6 +1,7 @@
 """Turn LiDAR scans into objects: where the centre of each one is, for every class that it could be."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -17,6 +18,7 @@ from mcap_landmarks.channels import (
 )
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.geometry import frames
+from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.lidar import thesis
 from mcap_landmarks.lidar.beams import Beams, together
 from mcap_landmarks.lidar.clustering import cluster, shapes_of
@@ -24,7 +26,7 @@ from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.object_tracks import Tracks
 from mcap_landmarks.lidar.objects import Hypotheses
 from mcap_landmarks.lidar.scan_beams import beams_of
-from mcap_landmarks.lidar.whole_clouds import CloudObject, points_in_base, whole_cloud
+from mcap_landmarks.lidar.whole_clouds import CloudObject, WholeCloud, points_in_base, whole_cloud
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.boxes import Boxes
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
@@ -33,6 +35,7 @@ from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.mounting import Mounting
 from mcap_landmarks.stage import Bundle, Omission, Stage, Stamped
+from mcap_landmarks.vision.prefetch import in_order
 
 _BASES = (BASE_FRAME, "base_link")
 
@@ -53,10 +56,11 @@ def process(
         return
     shapes = shapes_of(config)
     tracks = Tracks(config.gate_m, config.memory_s)
-    for bundle in bundles:
-        base = _base_of(bundle, mounting)
-        if config.slice_m is None and isinstance(bundle.messages[SCAN], PointCloud2):
-            yield from _whole(bundle, base, mounting, tracks, config)
+    # While one cloud is clustered, others are read, turned and written.
+    for scan, whole in in_order(_scans(bundles, mounting, config), _points, partial(_clustered, config=config)):
+        bundle, base = scan.bundle, scan.base
+        if whole is not None:
+            yield from _of_cloud(bundle, base, tracks, whole)
             continue
         beams = _beams(bundle, base, mounting, config)
         if beams is None:
@@ -69,20 +73,48 @@ def process(
         yield Stamped(SCAN_OBJECTS, bundle.log_time_ns, _message(bundle.stamp_ns, base, names, found))
 
 
-def _whole(bundle: Bundle, base: str, mounting: Mounting, tracks: Tracks, config: ClusterConfig) -> Iterator[Stamped]:
-    """The points above the ground of a bundle's clouds, and a box around each of their clusters."""
-    moved = None if bundle.odometry is None else partial(bundle.odometry.base_from_then, bundle.stamp_ns)
-    parts, places = [], []
+@dataclass(frozen=True, slots=True, eq=False)
+class _Scan:
+    """A bundle, its base frame, and its clouds with base_from_lidar (4, 4); none where it counts as a planar scan."""
+
+    bundle: Bundle
+    base: str
+    clouds: tuple[tuple[PointCloud2, Array], ...]
+
+
+def _scans(bundles: Iterable[Bundle], mounting: Mounting, config: ClusterConfig) -> Iterator[_Scan]:
+    for bundle in bundles:
+        base = _base_of(bundle, mounting)
+        is_whole = config.slice_m is None and isinstance(bundle.messages[SCAN], PointCloud2)
+        yield _Scan(bundle, base, _clouds(bundle, base, mounting) if is_whole else ())
+
+
+def _clouds(bundle: Bundle, base: str, mounting: Mounting) -> tuple[tuple[PointCloud2, Array], ...]:
+    found = []
     for channel in (SCAN, SECOND_SCAN):
         message = bundle.messages.get(channel)
         if message is None:
             continue
         if not isinstance(message, PointCloud2):
             raise UsageError("a planar scan joins a point cloud as a slice of it only: give --slice ZMIN:ZMAX in m")
-        base_from_lidar = mounting.lookup(bundle, base, message.frame_id)
-        parts.append(points_in_base(message, bundle.stamp_ns, base_from_lidar, moved))
-        places.append(base_from_lidar[:2, 3])
-    found = whole_cloud(np.concatenate(parts), places[0], config)
+        found.append((message, mounting.lookup(bundle, base, message.frame_id)))
+    return tuple(found)
+
+
+def _points(scan: _Scan) -> tuple[Array, Array] | None:
+    """The points (N, 3) of a scan's clouds in the base frame, and where the first LiDAR is (2,)."""
+    bundle = scan.bundle
+    moved = None if bundle.odometry is None else partial(bundle.odometry.base_from_then, bundle.stamp_ns)
+    parts = [points_in_base(cloud, bundle.stamp_ns, place, moved) for cloud, place in scan.clouds]
+    return (np.concatenate(parts), scan.clouds[0][1][:2, 3]) if parts else None
+
+
+def _clustered(points: tuple[Array, Array] | None, config: ClusterConfig) -> WholeCloud | None:
+    return None if points is None else whole_cloud(*points, config)
+
+
+def _of_cloud(bundle: Bundle, base: str, tracks: Tracks, found: WholeCloud) -> Iterator[Stamped]:
+    """The points above the ground of a bundle's clouds, and a box around each of their clusters."""
     middles = np.array([one.rectangle.centre_xy for one in found.objects]).reshape(-1, 2)
     names = tracks.names(bundle.stamp_ns, None if bundle.odometry is None else bundle.odometry.odom_from_base, middles)
     cloud = ClusteredCloud(bundle.stamp_ns, base, found.points_m, found.heights_m, found.clusters)
