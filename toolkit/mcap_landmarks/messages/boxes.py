@@ -41,5 +41,5 @@ class Boxes:
         return cls(
             np.array([point_from_ros(box.center.position) for box in boxes]),
             np.array([point_from_ros(box.size) for box in boxes]),
-            np.array([yaw_from_quaternion(quaternion_from_ros(box.center.orientation)) for box in boxes]),
+            yaw_from_quaternion([quaternion_from_ros(box.center.orientation) for box in boxes]),
         )
