@@ -19,6 +19,7 @@ from mcap_landmarks.channels import (
     SCAN,
     SCAN_OBJECTS,
     SCENE_OBJECTS,
+    SCENE_VELOCITIES,
     TF_STATIC,
 )
 from mcap_landmarks.fusion.cloud_fuser import CloudFuser
@@ -32,7 +33,9 @@ from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.match import Status
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
+from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.messages.velocities import SceneVelocities
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.report.explain_reading import read_situation
@@ -227,7 +230,13 @@ def of_a_cloud():  # type: ignore[no-untyped-def] # noqa: ANN201 - entries of a 
         (DETECTIONS, stamp_ns, replace(detections(told), stamp_ns=stamp_ns)),
         (CLUSTERED_CLOUD, stamp_ns, clustered([CAR, Solid(40.0, 0.0, 0.5, 60.0, 4.0)])),
         (SCENE_OBJECTS, stamp_ns, objects),
+        (SCENE_VELOCITIES, stamp_ns, moving(objects)),
     ]
+
+
+def moving(objects: SceneObjects) -> SceneVelocities:
+    velocities, spread = np.array([[3.0, 0.0]]), np.eye(2)[None]
+    return SceneVelocities(objects.stamp_ns, objects.frame_id, objects.ids, velocities, spread, np.array([0.9]))
 
 
 @pytest.mark.slow
@@ -239,7 +248,7 @@ def test_a_cloud_that_was_not_localized_yet(tmp_path: Path, capsys: pytest.Captu
     assert re.search(r"clustered: \d+ points above the ground, in 2 clusters\n", said)
     assert "fused: 1 objects; detected, but no object: 1, as follows\n  car 0.60 about pixel " in said
     drawn = (tmp_path / "e.svg").read_text()
-    for text in ("detections that are no object (red, dashed)", "1  car 0.", "edge of the image", "95 % region"):
+    for text in ("detections that are no object (red, dashed)", "1  car 0.", "edge of the image", "moves, in a second"):
         assert text in drawn
     document = explained(log, 10**9, capsys)
     (one,), (missed,) = document["objects"], document["lost"]

@@ -14,11 +14,12 @@ from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.boxes import Boxes
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.velocities import SceneVelocities
 from mcap_landmarks.report.box_outcomes import LostBox, corners_of, edges_in_image
 from mcap_landmarks.report.plots import draw_ellipses
 
 _OBJECTS = ("#D55E00", "#0072B2", "#009E73", "#B0127B", "#7A5195", "#A16207", "#0E7490", "#BE123C")
-_LOST, _RANGE = "#EF4444", "#9CA3AF"
+_LOST, _RANGE, _MOVES = "#EF4444", "#9CA3AF", "#111827"
 _DASHES = (0, (6, 3))
 _GOLDEN = 0.618034
 """Hues so far apart of one another never come close to each other (Knuth, TAOCP 3, 6.4, multiplicative hashing)."""
@@ -83,6 +84,17 @@ def draw_from_above(axes: Axes, scene: SceneObjects, cloud: ClusteredCloud, view
         axes.plot(distance * np.cos(angle), distance * np.sin(angle), color=_RANGE, linewidth=0.4, zorder=1)
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
+
+
+def draw_velocities(axes: Axes, scene: SceneObjects, velocities: SceneVelocities) -> None:
+    """What rather moves than stands, with an arrow to where it is a second later."""
+    moving = [i for i, name in enumerate(velocities.ids) if name in velocities.moving_ids and name in scene.ids]
+    if not moving or velocities.frame_id != scene.frame_id:
+        return
+    x, y = scene.positions_xy[[scene.ids.index(velocities.ids[i]) for i in moving]].T
+    u, v = velocities.velocities_mps[moving].T
+    axes.quiver(x, y, u, v, angles="xy", scale_units="xy", scale=1.0, width=0.003, color=_MOVES, zorder=7)
+    axes.plot([], [], color=_MOVES, linewidth=2, label="moves, in a second")
 
 
 def _draw_view(axes: Axes, view: CameraView) -> None:

@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 
 from mcap_landmarks.evaluation.explain import Place, Situation
 from mcap_landmarks.geometry.se2 import Array, transform_points
-from mcap_landmarks.report.cloud_picture import draw_cuboids, draw_from_above, draw_lost
+from mcap_landmarks.report.cloud_picture import draw_cuboids, draw_from_above, draw_lost, draw_velocities
 from mcap_landmarks.report.explain_reading import Picture, SensorData
 from mcap_landmarks.report.plots import draw_ellipses
 
@@ -101,6 +101,8 @@ def _draw_objects(axes: Axes, situation: Situation, view: SensorData) -> None:
     scene = situation.scene
     if scene is not None and view.cloud is not None:
         draw_from_above(axes, scene, view.cloud, view.views)
+        if view.velocities is not None:
+            draw_velocities(axes, scene, view.velocities)
         _draw_robot(axes)
         _finish(axes, "from above [m], ahead is to the right; points above the ground, a colour per cluster")
         return

@@ -22,6 +22,7 @@ from mcap_landmarks.channels import (
     SCAN,
     SCAN_OBJECTS,
     SCENE_OBJECTS,
+    SCENE_VELOCITIES,
     TF_STATIC,
 )
 from mcap_landmarks.config import stage_config
@@ -41,6 +42,7 @@ from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.velocities import SceneVelocities
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.report.box_outcomes import LostBox, lost_boxes
 from mcap_landmarks.stage import Channel, Config, Connection, RawMessage
@@ -51,7 +53,7 @@ _C = TypeVar("_C", bound=Config)
 _AROUND_NS = 3 * 10**9
 _BESIDE_NS = 10**9
 """How far from the asked time the bundle may be, and from the bundle what its sensors saw."""
-_OF_BUNDLE = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, SCAN_OBJECTS, CLUSTERED_CLOUD)
+_OF_BUNDLE = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, SCAN_OBJECTS, CLUSTERED_CLOUD, SCENE_VELOCITIES)
 _BESIDE = (DETECTIONS, CAMERA_IMAGE, CAMERA_INFO, SCAN)
 
 
@@ -71,12 +73,13 @@ class Picture(NamedTuple):
 class SensorData:
     """What the sensors saw: every camera's image, and the scan as points (N, 2) in the base frame.
 
-    Of a cloud there are the points in clusters instead.
+    Of a cloud there are the points in clusters instead, with how fast objects move.
     """
 
     pictures: tuple[Picture, ...] = ()
     scan_xy: Array | None = None
     cloud: ClusteredCloud | None = None
+    velocities: SceneVelocities | None = None
 
     @property
     def views(self) -> tuple[CameraView, ...]:
@@ -197,7 +200,7 @@ def _view(recording: Recording, found: _Around, stamp_ns: int) -> SensorData:
     scene, cloud = found.at(SCENE_OBJECTS, stamp_ns), found.at(CLUSTERED_CLOUD, stamp_ns)
     if scene is not None and cloud is not None:
         pictures = [_beside_cloud(recording, found, picture, scene, cloud) for picture in pictures]
-        return SensorData(tuple(pictures), cloud=cloud)
+        return SensorData(tuple(pictures), cloud=cloud, velocities=found.at(SCENE_VELOCITIES, stamp_ns))
     scan = found.at(SCAN, stamp_ns)
     if scan is None or scene is None:
         return SensorData(tuple(pictures))
