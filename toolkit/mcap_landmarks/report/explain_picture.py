@@ -11,6 +11,8 @@ from matplotlib.patheffects import withStroke
 
 from mcap_landmarks.evaluation.explain import Place, Situation
 from mcap_landmarks.geometry.se2 import Array, transform_points
+from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
+from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.report.cloud_picture import draw_cuboids, draw_from_above, draw_lost, draw_velocities
 from mcap_landmarks.report.explain_reading import Picture, SensorData
 from mcap_landmarks.report.plots import draw_ellipses
@@ -100,11 +102,7 @@ def _draw_objects(axes: Axes, situation: Situation, view: SensorData) -> None:
     """Points, clusters and objects in the base frame, x ahead."""
     scene = situation.scene
     if scene is not None and view.cloud is not None:
-        draw_from_above(axes, scene, view.cloud, view.views)
-        if view.velocities is not None:
-            draw_velocities(axes, scene, view.velocities)
-        _draw_robot(axes)
-        _finish(axes, "from above [m], ahead is to the right; points above the ground, a colour per cluster")
+        _draw_cloud(axes, scene, view, view.cloud)
         return
     if view.scan_xy is not None:
         axes.plot(*view.scan_xy.T, ".", color=_GREY, markersize=2.5, label="scan")
@@ -119,6 +117,14 @@ def _draw_objects(axes: Axes, situation: Situation, view: SensorData) -> None:
             axes.annotate(text, place, (5, 4), textcoords="offset points", fontsize=7, color="#374151")
     _draw_robot(axes)
     _finish(axes, "around the robot [m], x ahead")
+
+
+def _draw_cloud(axes: Axes, scene: SceneObjects, view: SensorData, cloud: ClusteredCloud) -> None:
+    draw_from_above(axes, scene, cloud, view.views)
+    if view.velocities is not None:
+        draw_velocities(axes, scene, view.velocities)
+    _draw_robot(axes)
+    _finish(axes, "from above [m], ahead is to the right; points above the ground, a colour per cluster")
 
 
 def _draw_robot(axes: Axes) -> None:
