@@ -70,7 +70,12 @@ def test_show_prints_everything(tmp_path: Path, capsys: pytest.CaptureFixture[st
     write_map(tmp_path / "m.db", small_map())
     assert run("show", tmp_path / "m.db") == DONE
     out = capsys.readouterr().out
-    for text in ("4 landmarks and 2 groups in frame map", "38 of 40 bundles used", "person (tentative)", "a b c"):
+    for text in (
+        "4 landmarks and 2 groups in frame map",
+        "38 of 40 bundles used",
+        "person (tentative, movable)",
+        "a b c",
+    ):
         assert text in out
     assert run("show", tmp_path / "m.db", "--json") == DONE
     document = json.loads(capsys.readouterr().out)

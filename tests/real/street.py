@@ -13,6 +13,7 @@ from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.maps.database import read_map
 
+from docs.kitti import CLOUD, write_log
 from tests.real import roads
 from tests.real.roads_judge import read
 
@@ -37,9 +38,9 @@ def drive_street(data: Path, folder: Path, *options: str) -> Street:
     """Map the even frames in a folder, localize the odd ones; the map begins where the truth does."""
     source, model = data / "roads" / "kitti_tracking_0001", data / "models" / "yolov5n-coco.onnx"
     odd = roads.drive_frames(source, roads.DRIVE[1::2])
-    roads.write_log(folder / "even.mcap", roads.drive_frames(source, roads.DRIVE[::2]))
-    roads.write_log(folder / "odd.mcap", odd)
-    words = ["--map", folder / "street.db", "--scan-from", roads.CLOUD.topic, "--model", model, *options]
+    write_log(folder / "even.mcap", roads.drive_frames(source, roads.DRIVE[::2]))
+    write_log(folder / "odd.mcap", odd)
+    words = ["--map", folder / "street.db", "--scan-from", CLOUD.topic, "--model", model, *options]
     _call("map", folder / "even.mcap", *words)
     _call("localize", folder / "odd.mcap", *words, "-o", folder / "out.mcap")
     landmarks = read_map(folder / "street.db")
