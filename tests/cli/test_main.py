@@ -1,5 +1,6 @@
 """The command itself: quick help, one line per error, exit codes."""
 
+import os
 import subprocess
 import sys
 
@@ -27,6 +28,21 @@ def test_help_imports_nothing_heavy() -> None:
     for verb, short_help in verbs().items():
         assert f" {verb} " in done.stdout
         assert short_help
+
+
+@pytest.mark.parametrize(("given", "threads"), [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2)])
+def test_products_of_matrices_take_one_thread_where_nothing_else_is_said(given: dict[str, str], threads: int) -> None:
+    """Those of more wait for each other in a loop, which takes the cores that other work needs."""
+    script = (
+        "import os\nfrom mcap_landmarks.cli.main import run\n"
+        "try:\n    run(['--version'])\nexcept SystemExit:\n    pass\n"
+        "import numpy as np\nnp.ones((500, 500)) @ np.ones((500, 500))\nprint(len(os.listdir('/proc/self/task')))"
+    )
+    environment = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, env={**environment, **given}
+    )
+    assert int(done.stdout.split()[-1]) == min(threads, len(os.sched_getaffinity(0)))
 
 
 @pytest.mark.parametrize("verb", sorted(verbs()))

@@ -1,6 +1,7 @@
 """The command `mcap-landmarks`: finds the verbs in this folder and loads the one that is asked for."""
 
 import importlib
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -72,6 +73,9 @@ def _root(
 
 def run(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its code."""
+    # NumPy's products are of small matrices, which BLAS shares out among threads that mostly wait in a loop for each
+    # other: that took a third of the processor time of clustering. It reads this when NumPy is first imported, later.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     given = sys.argv[1:] if arguments is None else arguments
     asked = next((word for word in given if not word.startswith("-")), None)
     application: Callable[..., object] = build(asked)
