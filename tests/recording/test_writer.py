@@ -52,6 +52,23 @@ def test_other_tools_read_it(tmp_path: Path) -> None:
         assert chunk.message_end_time - chunk.message_start_time <= 5 * SECOND
 
 
+def test_what_is_read_once_holds_the_same_and_is_compressed_quickly(tmp_path: Path) -> None:
+    contents, forms = [], []
+    for is_passing in (False, True):
+        path = tmp_path / f"{is_passing}.mcap"
+        with create_recording(path, is_passing=is_passing) as writer:
+            for i in range(100):
+                writer.add(Stamped(ODOMETRY, i, Odometry.planar(i, ("odom", "base"), (i, 0, 0), np.eye(3))))
+        with open_recording(path) as recording:
+            contents.append([(raw.log_time_ns, bytes(raw.data)) for raw in recording.messages()])
+        with path.open("rb") as stream:
+            summary = make_reader(stream, validate_crcs=True).get_summary()
+        assert summary is not None
+        forms.append({chunk.compression for chunk in summary.chunk_indexes})
+    assert contents[0] == contents[1]
+    assert forms == [{"zstd"}, {"lz4"}]
+
+
 @pytest.mark.slow
 def test_doctor_finds_nothing(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"

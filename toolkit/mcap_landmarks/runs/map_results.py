@@ -105,7 +105,7 @@ def _difference(entries: Mapping[str, str], plan: MapPlan) -> str:
 def write_part(plan: MapPlan, log: LogPlan, landmark_map: LandmarkMap, trajectory: LogTrajectory, parts: Path) -> None:
     """One log's results of the map as a recording of their own."""
     record = plan.share(log)
-    with create_recording(part_file(parts, record)) as writer:
+    with create_recording(part_file(parts, record), is_passing=True) as writer:
         for stamped in _results(landmark_map, trajectory):
             writer.add(stamped, record.stage)
         writer.metadata[RUN] = Manifest("part", fingerprint=record.key, stages=(record,)).entries()

@@ -26,7 +26,7 @@ def run_stage(step: Step, log: StageInput, thinning: Thinning, target: Path, pro
     """
     stage, counts = step.stage, Counter[str]()
     writes, notes = _writes(stage, log, step.config)
-    with create_recording(target) as writer:
+    with create_recording(target, is_passing=True) as writer:
         bundles = log.bundles(progress, thinning) if stage.thinned else log.bundles(progress)
         for result in naming(log.path, stage.process(bundles, step.config, step.files)):
             if isinstance(result, Omission):
