@@ -176,8 +176,10 @@ def _of_piece(
 
 def _beside(look: Look, box: int) -> NDArray[np.bool_]:
     """Which points (N,) of the cloud are beside the image, where the image cuts a box: the object goes on there."""
-    off = wrap(look.cloud.bearings_rad - look.boxes.middle[box])
     left, right = look.boxes.cut[box, [0, 2]].tolist()
+    if not (left or right):
+        return np.zeros(len(look.cloud.bearings_rad), dtype=np.bool_)
+    off = wrap(look.cloud.bearings_rad - look.boxes.middle[box])
     beyond: NDArray[np.bool_] = ((off > 0) & left) | ((off < 0) & right)
     return beyond & ~look.cloud.is_inside
 

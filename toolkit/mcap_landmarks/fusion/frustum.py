@@ -60,7 +60,7 @@ class CloudView:
         with np.errstate(invalid="ignore"):
             inside = ((pixels >= -beside) & (pixels <= view.camera.size_px + beside)).all(axis=1)
         pixels[~inside] = np.nan
-        shown = np.isin(cloud.clusters, np.unique(cloud.clusters[inside]))
+        shown = np.isin(cloud.clusters, cloud.clusters[inside])
         heights, away = cloud.heights_m[shown].astype(np.float64), away[shown]
         return cls(
             points[shown, :2],

@@ -111,6 +111,8 @@ class CameraModel:
         return angle
 
     def _distorted(self, plane: Array) -> Array:
+        if not self.distortion.any():
+            return plane
         k1, k2, p1, p2, k3, k4, k5, k6 = self.distortion
         x, y = plane[..., 0], plane[..., 1]
         s = x * x + y * y
