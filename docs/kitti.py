@@ -23,6 +23,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY, TF_STATIC
+from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage
@@ -76,8 +77,14 @@ def object_frames(folder: Path, numbers: Iterable[int], poses: Mapping[int, Arra
             (folder / "image_2" / f"{name}.png").read_bytes(),
             _points(folder / "velodyne" / f"{name}.bin"),
             *camera(projection, rectified_from_lidar),
-            None if poses is None else poses[number],
+            None if poses is None else _pose_of(poses, number),
         )
+
+
+def _pose_of(poses: Mapping[int, Array], number: int) -> Array:
+    if number not in poses:
+        raise ValueError(f"there is no pose of frame {number}; leave it out with --first and --last, or add its pose")
+    return poses[number]
 
 
 def raw_frames(folder: Path, numbers: Iterable[int]) -> Iterator[Frame]:
@@ -105,6 +112,8 @@ def raw_frames(folder: Path, numbers: Iterable[int]) -> Iterator[Frame]:
 def read_poses(path: Path, numbers: Sequence[int]) -> dict[int, Array]:
     """Poses (3,) by frame, of the rows of a file; those of rows without a frame's number are of `numbers`, in order."""
     found = np.loadtxt(path, ndmin=2)
+    if found.shape[1] not in (12, 13):
+        raise ValueError(f"{path}: rows of {found.shape[1]} numbers; a pose has 12, or a frame's number before them")
     names = numbers if found.shape[1] == 12 else found[:, 0].astype(int).tolist()
     matrices = found[:, -12:].reshape(-1, 3, 4)
     return {
@@ -224,12 +233,15 @@ def main() -> None:
     numbers = sorted(int(file.stem) for file in clouds.glob("*.bin"))
     numbers = [number for number in numbers if asked.first <= number <= asked.last]
     if not numbers:
-        parser.error(f"no clouds in {clouds}; give a folder in KITTI's object layout, or a drive of its raw data")
-    if is_raw:
-        write_log(asked.output, raw_frames(asked.folder, numbers))
-    else:
-        poses = read_poses(asked.poses, numbers) if asked.poses else None
-        write_log(asked.output, object_frames(asked.folder, numbers, poses))
+        parser.error(f"{clouds} has no such clouds; give a folder in KITTI's object layout, or a drive of its raw data")
+    try:
+        if is_raw:
+            write_log(asked.output, raw_frames(asked.folder, numbers))
+        else:
+            poses = read_poses(asked.poses, numbers) if asked.poses else None
+            write_log(asked.output, object_frames(asked.folder, numbers, poses))
+    except (OSError, ValueError, ToolkitError) as error:
+        parser.error(str(error))
 
 
 if __name__ == "__main__":

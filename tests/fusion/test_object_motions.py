@@ -18,7 +18,9 @@ class Follower:
     def __init__(self) -> None:
         self.motions, self.stamp_ns = ObjectMotions(), 10**9
 
-    def see(self, places: list[tuple[str, float, float]]) -> tuple[tuple[str, ...], SceneVelocities | None]:
+    def see(
+        self, places: list[tuple[str, float, float]], *, widen: bool = False
+    ) -> tuple[tuple[str, ...], SceneVelocities | None]:
         """Objects (class, x, y in the world) of the next scan: their ids and velocities."""
         self.stamp_ns += PERIOD_NS
         base = np.array([5.0 * (self.stamp_ns - 10**9) / 1e9, 0.0, np.pi / 2])
@@ -96,7 +98,7 @@ def test_a_place_off_the_others_is_a_surprise_and_one_where_it_should_be_is_none
     points = transform_points(inverse(base), np.array([[20.0, 0.0], [20.0, 9.2], [3.0, 3.0]]))
     seen = points, np.tile(SPREAD, (3, 1, 1))
     there, off, new = follower.motions.surprises(stamp_ns, base, seen, ("1", "2", "3"))
-    assert there == pytest.approx(0.0, abs=1e-9)
+    assert there == 1.0
     # 1.2 m off, where both are known to 0.2 m, and tracks to 5 cm more at best.
     assert off == pytest.approx(1.2**2 / (2 * (0.2**2 + 0.05**2)) / 2)
     assert new == 1.0
@@ -109,4 +111,13 @@ def test_what_drives_is_expected_where_its_velocity_takes_it() -> None:
         follower.see([("car", 40.0 - 1.2 * i, 2.0)])
     stamp_ns, base = follower.stamp_ns + PERIOD_NS, np.zeros(3)
     seen = np.array([[40.0 - 1.2 * 8, 2.0]]), SPREAD[None]
-    assert follower.motions.surprises(stamp_ns, base, seen, ("1",))[0] == pytest.approx(0.0, abs=1e-6)
+    assert follower.motions.surprises(stamp_ns, base, seen, ("1",)).tolist() == [1.0]
+
+
+def test_what_surprises_is_not_less_sure_to_move() -> None:
+    """The first place was of something else, and all others are in a line: a scene's wider covariances are not used."""
+    follower = Follower()
+    for i in range(14):
+        velocities = follower.see([("car", 43.0 if i == 0 else 40.0 - 1.0 * i, 2.0)], widen=True)[1]
+    assert velocities is not None
+    assert velocities.moving.tolist() == [1.0]

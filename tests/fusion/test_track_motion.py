@@ -48,9 +48,24 @@ def test_a_middle_that_wanders_as_more_of_a_car_is_seen_is_no_motion() -> None:
 @pytest.mark.parametrize("usual_mps", [0.0, CAR_MPS])
 def test_a_place_that_jumps_is_no_motion(usual_mps: float) -> None:
     """The boxes of a parked car that end are followed by those of the next one."""
-    places = straight((0.0, 0.0), 12)
+    places = straight((0.0, 0.0), 32)
     places[6:] += [5.0, 0.0]
-    assert followed(places, 0.2, usual_mps).moving < 0.5
+    assert followed(places[:12], 0.2, usual_mps).moving == 0.5  # here and there: nobody knows
+    assert followed(places, 0.2, usual_mps).moving < 0.01
+
+
+def test_one_place_that_is_off_does_not_hide_a_motion() -> None:
+    """The first box of a car was of something else: 2 m off, and all others in a line."""
+    places = straight((-9.2, 0.0), 20)
+    places[0] += [-3.0, 1.5]
+    motion = followed(places, 0.3, CAR_MPS)
+    assert motion.moving == 1
+    assert motion.velocity is not None
+    np.testing.assert_allclose(motion.velocity.xy_mps, [-9.2, 0.0], atol=0.6)
+
+
+def test_two_places_say_little_of_whether_something_moves() -> None:
+    assert followed(straight((25.0, 0.0), 2), 0.1, CAR_MPS).moving == 0.3
 
 
 def test_four_places_in_a_line_are_sure_and_three_are_probable() -> None:

@@ -80,7 +80,7 @@ def test_npm_packs_the_version_that_is_known(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(npm_package.shutil, "which", lambda _: "/bin/npm")
     monkeypatch.setattr(npm_package.subprocess, "run", pack)
     assert package_files(PACKAGE, None, ignore) == {"package/w.bin": CONTENT}
-    assert asked == [["/bin/npm", "pack", "@a/b@1.0.0", "--ignore-scripts", "--silent"]]
+    assert asked == [["/bin/npm", "pack", "@a/b@1.0.0", "--ignore-scripts", "--loglevel=error", "--fetch-retries=1"]]
 
 
 def test_without_npm_or_network_the_other_way_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

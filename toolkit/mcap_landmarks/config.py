@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import difflib
 import json
+import re
 import tomllib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -59,6 +60,7 @@ def declaration(name: str) -> Declaration:
     return Declaration(stage.config, stage.files)
 
 
+_TYPE_NAME = re.compile(r"[-\[]")
 _WORDS = {"tuple_type": 'give a list, such as ["person", "suitcase"] or [0.1, 0.3]'}
 """What pydantic says in terms of Python, in terms of TOML."""
 
@@ -112,9 +114,13 @@ def stage_config(config: type[_C], stage: str, settings: Mapping[str, object]) -
     try:
         made = TypeAdapter(config).validate_python(dict(settings))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join([stage, *(str(part) for part in first["loc"])])
-        raise UsageError(f"{where} = {first['input']!r}: {_WORDS.get(first['type'], first['msg'])}") from error
+        first, *others = error.errors()
+        # Of a value that may be of several types pydantic tells each with the type's name behind the key.
+        where = ".".join([stage, *(str(part) for part in first["loc"] if not _TYPE_NAME.search(str(part)))])
+        several = len(where.split(".")) <= len(first["loc"])
+        told = [first, *(other for other in others if several and other["loc"][:-1] == first["loc"][:-1])]
+        words = " or ".join(_WORDS.get(one["type"], one["msg"]) for one in told)
+        raise UsageError(f"{where} = {first['input']!r}: {words}") from error
     _all_taken(settings, effective(made), stage)
     return made
 

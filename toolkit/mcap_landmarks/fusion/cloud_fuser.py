@@ -45,7 +45,7 @@ class CloudFuser:
         best = [options[0][0] for options in classes]
         places, upright_m = _placed([views[0] for views in objects], best)
         surprises = self._motions.surprises(cloud.stamp_ns, odometry, _seen(places), names)
-        scene = _scene(cloud, names, classes, places, upright_m, np.maximum(surprises, 1.0))
+        scene = _scene(cloud, names, classes, places, upright_m, surprises)
         explained = sum(one.thing.boxes for views in objects for one in views)
         return scene, sum(len(image.detections) for image in images) - explained
 

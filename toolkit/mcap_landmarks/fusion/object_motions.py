@@ -24,6 +24,7 @@ class ObjectMotions:
     def __init__(self) -> None:
         self._motions: dict[str, TrackMotion] = {}
         self._classes: dict[str, str] = {}
+        self._widened: dict[str, float] = {}
         self._count = 0
 
     def names(
@@ -47,7 +48,9 @@ class ObjectMotions:
     ) -> Array:
         """How far objects (N,) are off where they should be by their tracks: squared, by both covariances, per degree.
 
-        1, what is to be expected, for those that were not seen before. `seen` is as in `names`.
+        1, what is to be expected, for those that were not seen before, and the least for others. `seen` is as in
+        `names`. Covariances that are so many times wider are not those by which `add` takes a scene's velocities: what
+        drives would seem to be ever less sure of standing elsewhere.
         """
         factors = np.ones(len(names))
         if odom_from_base is None:
@@ -56,7 +59,8 @@ class ObjectMotions:
             if names[i] in self._motions:
                 there, unsure = self._motions[names[i]].expected(stamp_ns)
                 off = place - there
-                factors[i] = off @ np.linalg.solve(spread + unsure, off) / 2
+                factors[i] = max(off @ np.linalg.solve(spread + unsure, off) / 2, 1.0)
+        self._widened = dict(zip(names, factors.tolist(), strict=True))
         return factors
 
     def add(self, scene: SceneObjects, odometry: OdometryAt | None) -> SceneVelocities | None:
@@ -65,7 +69,9 @@ class ObjectMotions:
             self._motions.clear()
             return None
         self._forget(scene.stamp_ns)
-        places, covariances = _placed(scene.positions_xy, scene.covariances, odometry.odom_from_base)
+        widened = np.array([self._widened.get(name, 1.0) for name in scene.ids])
+        fitted = scene.covariances / widened[:, None, None]
+        places, covariances = _placed(scene.positions_xy, fitted, odometry.odom_from_base)
         ranges = np.hypot(*scene.positions_xy.T)
         for i, name in enumerate(scene.ids):
             motion = self._motions.setdefault(name, TrackMotion())

@@ -23,6 +23,10 @@ _ODDS = 100.0
 """So much likelier must it be that something moves than that it stands, since every object is asked at every scan."""
 _UNSURE = 0.99
 """Fewer places, or lesser odds, never make it surer than this that something moves."""
+_TWO = 2
+"""So few places say little of whether it moves at all: two objects may be taken for one."""
+_UNKNOWN, _WANDERS = 0.5, 9.0
+"""How probable it is that something moves that is in no line, but three standard deviations off its mean and more."""
 _STRAIGHT = 0.9
 """Share of the variance of places that a constant velocity explains, if it is one: a place that jumps has 0.75."""
 
@@ -98,21 +102,28 @@ class TrackMotion:
         times = np.array([(one.stamp_ns - self.last.stamp_ns) / 1e9 for one in self._places])
         places = np.array([one.place_xy for one in self._places])
         covariances = np.array([one.covariance for one in self._places])
-        weights = _weights(covariances)
-        since, off = times - weights @ times, places - weights @ places
-        velocity = (weights * since) @ off / (weights @ since**2)
-        spread = 2 * np.einsum("n,nij->ij", weights, covariances) + self._drift() * np.eye(2)
-        self.velocity = Velocity(velocity, spread / span_s**2)
-        left = off - since[:, None] * velocity
-        whole = float(weights @ (off**2).sum(axis=1))
-        straight = float(weights @ (left**2).sum(axis=1)) <= (1 - _STRAIGHT) * whole
-        self._judge(self.velocity, speed_mps, straight=straight)
+        line = _line(times, places, covariances)
+        if not line.is_straight and len(places) > _LEAST_PLACES:
+            # One place may be that of something else.
+            rest = np.arange(len(places)) != int(np.argmax((line.off**2).sum(axis=1)))
+            line = _line(times[rest], places[rest], covariances[rest])
+        spread = 2 * line.covariance + self._drift() * np.eye(2)
+        self.velocity = Velocity(line.velocity, spread / span_s**2)
+        self._judge(self.velocity, speed_mps, line)
 
-    def _judge(self, velocity: Velocity, speed_mps: float, *, straight: bool) -> None:
-        """Say how probable it is that the object moves; of what does so in no line nothing is known."""
-        odds = _odds(velocity, speed_mps) if straight and np.hypot(*velocity.xy_mps) >= _LEAST_MPS else 0.0
-        sure = self.moving == 1.0 or (odds >= _ODDS and len(self._places) >= _LEAST_PLACES)
-        self.moving = 1.0 if sure else odds / (1 + odds) * _UNSURE
+    def _judge(self, velocity: Velocity, speed_mps: float, line: "_Line") -> None:
+        """Say how probable it is that the object moves.
+
+        Of one that is here and there, in no line, nobody knows; two places may be of two objects.
+        """
+        odds = _odds(velocity, speed_mps) if np.hypot(*velocity.xy_mps) >= _LEAST_MPS else 0.0
+        count = len(self._places)
+        if self.moving == 1.0 or (line.is_straight and odds >= _ODDS and count >= _LEAST_PLACES):
+            self.moving = 1.0
+        elif line.is_straight:
+            self.moving = min(odds / (1 + odds), _UNSURE if count > _TWO else _MOVING)
+        else:
+            self.moving = _UNKNOWN if line.wander > _WANDERS else 0.0
 
     def _drift(self) -> float:
         """The variance in m^2 of what odometry makes an object seem to move, between the first place and the last."""
@@ -121,6 +132,28 @@ class TrackMotion:
         position = (_POSITION_SHARE * way) ** 2
         heading = _HEADING_RAD**2 * way + (_HEADING_SHARE * turned) ** 2
         return position + heading * last.range_m**2
+
+
+class _Line(NamedTuple):
+    """A constant velocity (2,) through places: how far these (N, 2) are off it, the mean of their covariances (2, 2),
+    whether it explains them, and how far they are off one place, squared and by that covariance."""
+
+    velocity: Array
+    off: Array
+    covariance: Array
+    is_straight: bool
+    wander: float
+
+
+def _line(times_s: Array, places: Array, covariances: Array) -> _Line:
+    """The line through places (N, 2) at times (N,), by least squares."""
+    weights = _weights(covariances)
+    since, away = times_s - weights @ times_s, places - weights @ places
+    velocity = (weights * since) @ away / (weights @ since**2)
+    off, mean = away - since[:, None] * velocity, np.einsum("n,nij->ij", weights, covariances)
+    whole = float(weights @ (away**2).sum(axis=1))
+    straight = float(weights @ (off**2).sum(axis=1)) <= (1 - _STRAIGHT) * whole
+    return _Line(velocity, off, mean, straight, whole / float(np.trace(mean)))
 
 
 def _weights(covariances: Array) -> Array:

@@ -83,6 +83,8 @@ class FrameTree:
         for name, ancestor_from_src in ups:
             if name in downs:
                 return inverse(downs[name]) @ ancestor_from_src
+        if not (plain(src) and plain(dst)):
+            raise RecordingError(f"a message names no frame, where {plain(src) or plain(dst)} is asked for; {REMEDY}")
         ends = sorted({ups[-1][0], self.chain(dst)[-1][0]})
         raise RecordingError(
             f"no transforms lead from {plain(src)} to {plain(dst)}: {' and '.join(ends)} have no parent; {REMEDY}"

@@ -190,7 +190,7 @@ def _only(recording: Readable, channel: Channel[Message], fitting: list[str], ch
 def _check_chosen(recording: Readable, role: Role, topic: str, found: Collection[Connection]) -> None:
     if not found:
         raise UsageError(
-            f"{recording.path}: there is no topic {topic} for {role.option}; mcap-landmarks info lists them"
+            f"{recording.path}: there is no topic {topic} to read as the {role.name}; mcap-landmarks info lists them"
         )
     for connection in found:
         if connection.message_type not in role.types:

@@ -17,6 +17,8 @@ from mcap_landmarks.messages.points import PointCloud2
 BaseFromThen = Callable[[NDArray[np.int64]], Array]
 """Poses (N, 3) of the base at times (N,) in ns, in the base frame at the moment that is asked for."""
 
+_FARTHEST_M = 1e4
+"""No LiDAR measures farther; larger coordinates are no returns."""
 _LARGEST_M = 20.0
 """Unless it is said otherwise, what is larger is background: the longest buses have 19 m (Directive 96/53/EC)."""
 
@@ -49,8 +51,8 @@ def points_in_base(
 
     `base_from_then` says where the base was at times (N,) in ns; `stamp_ns` stands in where the cloud has no stamp.
     """
-    x, y, z = cloud.points_m.T
-    returned = np.isfinite(x) & np.isfinite(y) & np.isfinite(z)
+    x, y, z = np.abs(cloud.points_m.T)
+    returned = (x < _FARTHEST_M) & (y < _FARTHEST_M) & (z < _FARTHEST_M)  # what is not a number is not less
     points = frames.apply(base_from_lidar, cloud.points_m[returned])
     if base_from_then is not None and cloud.times_ns is not None and len(points):
         moved = base_from_then((cloud.stamp_ns or stamp_ns) + cloud.times_ns[returned])

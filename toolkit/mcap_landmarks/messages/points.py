@@ -123,9 +123,11 @@ def points_from_ros(ros: RosObject, layout: Mapping[str, str]) -> NDArray[np.voi
     offsets = [next(field.offset for field in ros.fields if field.name == name) for name in names]
     point = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": int(ros.point_step)})
     rows = np.ascontiguousarray(ros.data).reshape(-1)
-    if len(rows) < ros.height * ros.row_step or ros.row_step < ros.width * ros.point_step:
+    row_bytes = ros.width * ros.point_step
+    step = ros.row_step if ros.height > 1 else row_bytes  # of a single row nothing follows
+    if len(rows) < ros.height * step or step < row_bytes:
         raise MessageError(f"a point cloud of {ros.width} x {ros.height} points has {len(rows)} bytes only")
-    rows = rows[: ros.height * ros.row_step].reshape(ros.height, -1)[:, : ros.width * ros.point_step]
+    rows = rows[: ros.height * step].reshape(ros.height, -1)[:, :row_bytes]
     return np.frombuffer(np.ascontiguousarray(rows).data, dtype=point)
 
 

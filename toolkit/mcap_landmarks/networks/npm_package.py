@@ -53,7 +53,7 @@ def _packed(package: NpmPackage, folder: Path) -> Path:
     remedy = f"download the package {package} another way (its page on npm has it as .tgz) and give --from FILE.tgz"
     if npm is None:
         raise UsageError(f"npm, which fetches {package}, is not installed: install Node.js, or {remedy}")
-    command = [npm, "pack", str(package), "--ignore-scripts", "--silent"]
+    command = [npm, "pack", str(package), "--ignore-scripts", "--loglevel=error", "--fetch-retries=1"]
     ended = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
     archives = sorted(folder.glob("*.tgz"))
     if ended.returncode or len(archives) != 1:

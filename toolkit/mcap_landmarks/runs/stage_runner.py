@@ -37,9 +37,21 @@ def run_stage(step: Step, log: StageInput, thinning: Thinning, target: Path, pro
                 counts.update(tally(result.message))
                 writer.add(Stamped(channel, result.log_time_ns, result.message), stage.name)
         log.close()
+        _check_read(log)
         record = step.record.with_outcome(outcome_of(log.reading, counts, (*log.notes, *notes)))
         writer.metadata[RUN] = Manifest("part", fingerprint=record.key, stages=(record,)).entries()
     return record
+
+
+def _check_read(log: StageInput) -> None:
+    """Refuse a log of which no message could be read that a bundle is made of.
+
+    Raises:
+        RecordingError: as it says.
+    """
+    reading = log.reading
+    if reading.losses and not reading.association.bundles:
+        raise RecordingError(f"{log.path}: not one message of {log.primary.topic} could be read: {reading.losses[0]}")
 
 
 def outcome_of(reading: Reading, counts: Counter[str] | None = None, notes: tuple[str, ...] = ()) -> Outcome:

@@ -38,6 +38,7 @@ from mcap_landmarks.stage import Bundle, Omission, Stage, Stamped
 from mcap_landmarks.vision.prefetch import in_order
 
 _BASES = (BASE_FRAME, "base_link")
+_NOTHING_STANDS = "clouds in which nothing stands on the ground"
 
 
 def process(
@@ -61,6 +62,8 @@ def process(
         bundle, base = scan.bundle, scan.base
         if whole is not None:
             yield from _of_cloud(bundle, base, tracks, whole)
+            if not len(whole.clusters):
+                yield Omission(bundle.log_time_ns, _NOTHING_STANDS)
             continue
         beams = _beams(bundle, base, mounting, config)
         if beams is None:

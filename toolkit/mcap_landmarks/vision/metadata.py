@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 from mcap_landmarks.errors import ModelError
 from mcap_landmarks.locations import Location, to_read
-from mcap_landmarks.vision.onnx_session import OnnxSession
+from mcap_landmarks.vision.onnx_session import OnnxSession, written
 
 
 def literal(path: Location, metadata: Mapping[str, str], key: str) -> object:
@@ -47,7 +47,11 @@ def names_of(session: OnnxSession, names_file: Location | None) -> tuple[str, ..
     """
     names = _own_names(session) if names_file is None else _names_in(names_file)
     if not names:
-        raise ModelError(f"{session.path}: it has no class names in its metadata; give --names FILE, one name per line")
+        outputs = ", ".join(f"{entry.name} {written(entry.shape)}" for entry in session.outputs)
+        raise ModelError(
+            f"{session.path}: it has no class names in its metadata; give --names FILE, one name per line, if it is a "
+            f"detector (its outputs: {outputs})"
+        )
     return names
 
 
