@@ -27,6 +27,8 @@ class Follower:
         points: Array = transform_points(inverse(base), np.array([place[1:] for place in places]).reshape(-1, 2))
         classes, spreads = tuple(place[0] for place in places), np.tile(SPREAD, (len(places), 1, 1))
         names = self.motions.names(self.stamp_ns, base, (points, spreads), classes)
+        if widen:
+            spreads = spreads * self.motions.surprises(self.stamp_ns, base, (points, spreads), names)[:, None, None]
         scene = SceneObjects(
             self.stamp_ns,
             "base",
