@@ -154,5 +154,8 @@ STAGE = Stage(
         "score": 1e-6,
         "others.score": 1e-6,
         "size_m": 2e-6,
+        "velocities.twist.linear": 1e-4,  # places that are a micrometre apart, over a tenth of a second
+        "velocities.covariance": 1e-5,
+        "moving": 1e-3,
     },
 )
