@@ -43,9 +43,9 @@ def measure(quick: bool) -> Iterator[Row]:
 def street_rows(street: Street) -> Iterator[Row]:
     """The figures of the street whose even frames are mapped and whose odd ones are localized."""
     cars, frames = len(street.cars_off_m), street.frames
-    found, there = np.count_nonzero(street.cars_off_m <= NEAR_M), np.count_nonzero(street.poses_off_m <= THERE_M)
+    found, there = int((street.cars_off_m <= NEAR_M).sum()), int((street.poses_off_m <= THERE_M).sum())
     yield Row("street map: parked cars within 0.35 m", found / cars, "", 10 / 14, cases=cars)
-    yield Row("street map: farthest landmark from any car", street.landmarks_off_m.max(), "m", at_most=2.0)
+    yield Row("street map: farthest landmark from any car", float(street.landmarks_off_m.max()), "m", at_most=2.0)
     yield Row("street positions: within 0.2 m", there / frames, "", 0.8, cases=frames)
     yield Row("street positions: median off", float(np.median(street.poses_off_m)), "m", cases=frames)
     yield Row("street positions: NEES / 3", float(np.mean(street.poses_nees)) / 3, at_most=2.0, cases=frames)
