@@ -61,6 +61,7 @@ def declaration(name: str) -> Declaration:
 
 
 _TYPE_NAME = re.compile(r"[-\[]")
+"""Of a value that may be of several types pydantic tells what each says, with the type's name behind the key."""
 _WORDS = {"tuple_type": 'give a list, such as ["person", "suitcase"] or [0.1, 0.3]'}
 """What pydantic says in terms of Python, in terms of TOML."""
 
@@ -115,12 +116,11 @@ def stage_config(config: type[_C], stage: str, settings: Mapping[str, object]) -
         made = TypeAdapter(config).validate_python(dict(settings))
     except ValidationError as error:
         first, *others = error.errors()
-        # Of a value that may be of several types pydantic tells each with the type's name behind the key.
-        where = ".".join([stage, *(str(part) for part in first["loc"] if not _TYPE_NAME.search(str(part)))])
-        several = len(where.split(".")) <= len(first["loc"])
-        told = [first, *(other for other in others if several and other["loc"][:-1] == first["loc"][:-1])]
+        keys = [str(part) for part in first["loc"] if not _TYPE_NAME.search(str(part))]
+        one_of_several = len(keys) < len(first["loc"])
+        told = [first, *(other for other in others if one_of_several and other["loc"][:-1] == first["loc"][:-1])]
         words = " or ".join(_WORDS.get(one["type"], one["msg"]) for one in told)
-        raise UsageError(f"{where} = {first['input']!r}: {words}") from error
+        raise UsageError(f"{'.'.join([stage, *keys])} = {first['input']!r}: {words}") from error
     _all_taken(settings, effective(made), stage)
     return made
 

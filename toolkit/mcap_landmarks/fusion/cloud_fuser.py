@@ -9,6 +9,7 @@ from mcap_landmarks.fusion.camera_view import SeenImage
 from mcap_landmarks.fusion.cloud_objects import FoundObject, place_by_camera, place_of
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.object_motions import ObjectMotions
+from mcap_landmarks.fusion.scene_building import LEAST_TOLD
 from mcap_landmarks.fusion.several_views import ViewedObject, distinct, objects_in
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.lidar.rectangles import Rectangle
@@ -16,8 +17,6 @@ from mcap_landmarks.messages.boxes import Boxes
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.hypotheses import Hypotheses
 from mcap_landmarks.messages.scene import SceneObjects
-
-_LEAST_TOLD = 0.005
 
 
 class CloudFuser:
@@ -57,7 +56,7 @@ class CloudFuser:
                 told[known] = told.get(known, 0.0) + share * one.thing.score
         whole = sum(told.values())
         options = sorted(((known, score * weight / whole) for known, weight in told.items()), key=lambda one: -one[1])
-        return tuple((known, share) for known, share in options if share >= _LEAST_TOLD)
+        return tuple((known, share) for known, share in options if share >= LEAST_TOLD)
 
 
 def _placed(objects: Sequence[ViewedObject], names: Sequence[str]) -> tuple[list[Rectangle], Array]:

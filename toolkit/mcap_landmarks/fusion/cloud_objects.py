@@ -17,11 +17,11 @@ from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array, transform_points
 from mcap_landmarks.lidar.rectangles import BoxEdges, Rectangle, completed
 
-_FEWEST = 4
+FEWEST = 4
 """Fewer points than these may be of anything."""
 _CROWN_M = 0.3
 """So much taller than the largest of its class an object may be: loads, antennas, uneven ground."""
-_MARGIN_M = 0.35
+MARGIN_M = 0.35
 """Points so near to an object's rectangle are of it, whatever cluster they are in: wheels, mirrors, loads."""
 _ROOM_M = 0.5
 """How much larger than its class says something round may be."""
@@ -75,7 +75,7 @@ def find(look: Look, things: Sequence[Seen]) -> list[FoundObject]:
     """
     found = _by_points(look, things)
     for i, thing in enumerate(things):
-        if i not in found and np.count_nonzero(look.cloud.within(core(thing.box_xyxy))) < _FEWEST:
+        if i not in found and np.count_nonzero(look.cloud.within(core(thing.box_xyxy))) < FEWEST:
             place = place_by_camera(look, i, thing.name)
             if place is not None:
                 found[i] = FoundObject(i, thing.score, place, np.zeros(0, dtype=np.intp))
@@ -147,7 +147,7 @@ def _best(look: Look, box: int, thing: Seen, is_free: NDArray[np.bool_]) -> Piec
         size.foot_m,
     )
     found = pieces(look.cloud, thing, is_free, upright)
-    return next((piece for piece in found if len(piece.points) >= _FEWEST), None)
+    return next((piece for piece in found if len(piece.points) >= FEWEST), None)
 
 
 def _of_piece(
@@ -166,11 +166,11 @@ def _of_piece(
     if _cuboid(name) is None:
         return FoundObject(box, _probability(look, thing, piece.weight), place, points), points
     others = np.flatnonzero(low & inside)
-    whole = np.union1d(points, others[place.holds(cloud.points_xy[others], _MARGIN_M)])
+    whole = np.union1d(points, others[place.holds(cloud.points_xy[others], MARGIN_M)])
     if len(whole) > (1 + _MORE) * len(points):
         points, place = whole, place_of(look, box, name, whole)
     around = np.flatnonzero(is_free & near)
-    taken = around[place.holds(cloud.points_xy[around], _MARGIN_M / 2)]
+    taken = around[place.holds(cloud.points_xy[around], MARGIN_M / 2)]
     return FoundObject(box, _probability(look, thing, piece.weight), place, points), np.union1d(points, taken)
 
 

@@ -6,13 +6,11 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from mcap_landmarks.classes import CLASSES, speed_mps
-from mcap_landmarks.fusion.track_motion import TrackMotion
+from mcap_landmarks.fusion.track_motion import MOVING, TrackMotion
 from mcap_landmarks.geometry.se2 import Array
 
 _NEW_PER_M2 = 1e-3
 """Density of objects that were not seen before: one on 30 m by 30 m."""
-_MOVING = 0.3
-"""How many of the things that can move do."""
 _WANDER_M = 0.3
 """How far the middle of an object may wander from scan to scan, as more or less of it is seen."""
 _OTHER_CLASS = 0.002
@@ -59,7 +57,7 @@ def _density(motion: TrackMotion, name: str, stamp_ns: int, places: Array, covar
     if not speed:
         return stands
     drives = _normal(places - last.place_xy, spread + (since_s * speed) ** 2 * np.eye(2))
-    return (1 - _MOVING) * stands + _MOVING * drives
+    return (1 - MOVING) * stands + MOVING * drives
 
 
 def _normal(off: Array, covariances: Array) -> Array:

@@ -69,7 +69,7 @@ class ObjectMotions:
             self._motions.clear()
             return None
         self._forget(scene.stamp_ns)
-        widened = np.array([self._widened.get(name, 1.0) for name in scene.ids])
+        widened = np.array([self._widened.pop(name, 1.0) for name in scene.ids])
         fitted = scene.covariances / widened[:, None, None]
         places, covariances = _placed(scene.positions_xy, fitted, odometry.odom_from_base)
         ranges = np.hypot(*scene.positions_xy.T)

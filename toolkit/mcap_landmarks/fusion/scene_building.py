@@ -11,7 +11,7 @@ from mcap_landmarks.messages.hypotheses import Hypotheses
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
 
-_LEAST_TOLD = 0.005
+LEAST_TOLD = 0.005
 """Classes less probable are not told: markers show whole percents."""
 _APART = 1.25
 """Two objects of one class are farther apart than this many of its radii; two discs that touch would be two apart, and
@@ -35,7 +35,7 @@ def scene_of(objects: ScanObjects, tracks: TrackTable) -> SceneObjects:
         objects.stamp_ns,
         objects.frame_id,
         tuple(objects.ids[one.i] for one in kept),
-        tuple(tuple(option for option in one.options if option[1] >= _LEAST_TOLD) for one in kept),
+        tuple(tuple(option for option in one.options if option[1] >= LEAST_TOLD) for one in kept),
         np.array([one.position_xy for one in kept]).reshape(-1, 2),
         np.array([one.covariance for one in kept]).reshape(-1, 2, 2),
         np.array([one.radius_m for one in kept], dtype=np.float64),

@@ -13,6 +13,8 @@ _ALIKE = (frozenset({"car", "van", "truck", "bus", "train"}), frozenset({"bicycl
 _RIDDEN = {"bicycle": "cyclist", "motorcycle": "motorcycle"}
 """What people ride, and what it is called with them."""
 _RIDER = "person"
+_NOTHING_PX2 = 1e-9
+"""Boxes without any area share nothing."""
 _SAME = 0.6
 """Boxes of such classes that overlap by more (intersection over union) are of one thing: detectors suppress them within
 a class only."""
@@ -53,6 +55,12 @@ def overlap(one: Array, other: Array) -> float:
     return float(np.prod(np.maximum(high - low, 0.0)))
 
 
+def intersection_over_union(one: Array, other: Array) -> float:
+    """The share of the area of two boxes, in pixels, that both have."""
+    shared = overlap(one, other)
+    return shared / max(_area(one) + _area(other) - shared, _NOTHING_PX2)
+
+
 def _area(box: Array) -> float:
     return float(np.prod(box[2:] - box[:2]))
 
@@ -70,9 +78,8 @@ def _alike_joined(things: list[Seen]) -> list[Seen]:
 
 def _are_one(one: Seen, other: Seen) -> bool:
     """Whether two boxes are of one thing."""
-    shared = overlap(one.box_xyxy, other.box_xyxy)
-    union = _area(one.box_xyxy) + _area(other.box_xyxy) - shared
-    return any(one.name in alike and other.name in alike for alike in _ALIKE) and shared > _SAME * union
+    may_be = any(one.name in alike and other.name in alike for alike in _ALIKE)
+    return may_be and intersection_over_union(one.box_xyxy, other.box_xyxy) > _SAME
 
 
 def _told_twice(surer: Seen, other: Seen) -> Seen:

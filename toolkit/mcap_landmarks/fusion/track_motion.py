@@ -16,7 +16,7 @@ _LEAST_PLACES = 4
 it is sure that something moves."""
 _LEAST_MPS = 0.3
 """Slower than this is as good as standing: the middle of an object wanders as more of it comes into view."""
-_MOVING, _STRAYING, _STRAYING_MPS = 0.3, 0.01, 1.0
+MOVING, _STRAYING, _STRAYING_MPS = 0.3, 0.01, 1.0
 """How many things of classes that move by themselves do, and how many others, at what usual speed: what is carried, and
 what the network takes for something else."""
 _ODDS = 100.0
@@ -121,7 +121,7 @@ class TrackMotion:
         if self.moving == 1.0 or (line.is_straight and odds >= _ODDS and count >= _LEAST_PLACES):
             self.moving = 1.0
         elif line.is_straight:
-            self.moving = min(odds / (1 + odds), _UNSURE if count > _TWO else _MOVING)
+            self.moving = min(odds / (1 + odds), _UNSURE if count > _TWO else MOVING)
         else:
             self.moving = _UNKNOWN if line.wander > _WANDERS else 0.0
 
@@ -165,7 +165,7 @@ def _weights(covariances: Array) -> Array:
 
 def _odds(velocity: Velocity, speed_mps: float) -> float:
     """How much likelier something of a measured velocity is to move, at its usual speed, than to stand."""
-    usual, prior = (speed_mps, _MOVING) if speed_mps else (_STRAYING_MPS, _STRAYING)
+    usual, prior = (speed_mps, MOVING) if speed_mps else (_STRAYING_MPS, _STRAYING)
     whole = velocity.covariance + usual**2 * np.eye(2)
     stands, moves = (
         float(velocity.xy_mps @ np.linalg.solve(spread, velocity.xy_mps)) for spread in (velocity.covariance, whole)

@@ -61,7 +61,7 @@ def standing(scene: SceneObjects, moving_ids: Collection[str], dropped: Counter[
     keep = []
     for i, (name, class_name) in enumerate(zip(scene.ids, scene.classes, strict=True)):
         if name in moving_ids:
-            dropped[f"objects that move: {class_name}"] += 1
+            dropped[f"objects that seem to move: {class_name}"] += 1
         elif fixed and is_movable(class_name):
             dropped[f"objects that may stand elsewhere another day: {class_name}"] += 1
         else:

@@ -7,9 +7,10 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from mcap_landmarks.fusion.camera_view import CameraView
+from mcap_landmarks.fusion.cloud_objects import FEWEST, MARGIN_M
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.fusion.frustum import CloudView, core
-from mcap_landmarks.fusion.seen_things import Seen, overlap, seen_things
+from mcap_landmarks.fusion.seen_things import Seen, intersection_over_union, seen_things
 from mcap_landmarks.fusion.selection import wanted
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.se2 import Array
@@ -23,10 +24,6 @@ _STEPS = 16
 """Points along an edge of a cuboid: what of it is behind the camera is not drawn, to a sixteenth of its length."""
 _LEAST_IOU = 0.1
 """A box and the outline of its object overlap at least so much: of what is hidden, a box shows a part only."""
-_FEWEST = 4
-"""The fewest points that fuse takes for something."""
-_MARGIN_M = 0.35
-"""So far outside of an object's rectangle points are still its own, as in fuse."""
 _SIDES = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _EDGES = [(i, i | bit) for i in range(8) for bit in (1, 2, 4) if not i & bit]
 
@@ -95,7 +92,7 @@ def _without_object(things: Sequence[Seen], scene: SceneObjects, view: CameraVie
         outline, names = _outline(scene, j, view), {name for name, _ in options}
         for i, thing in enumerate(things):
             if outline is not None and names & {name for name, _ in thing.classes}:
-                shared[i, j] = _iou(thing.box_xyxy, outline)
+                shared[i, j] = intersection_over_union(thing.box_xyxy, outline)
     rows, columns = linear_sum_assignment(-shared)
     matched = {int(i) for i, j in zip(rows, columns, strict=True) if shared[i, j] >= _LEAST_IOU}
     return [i for i in range(len(things)) if i not in matched]
@@ -110,19 +107,14 @@ def _outline(scene: SceneObjects, i: int, view: CameraView) -> Array | None:
     return np.concatenate([pixels.min(axis=0), pixels.max(axis=0)]) if len(pixels) else None
 
 
-def _iou(one: Array, other: Array) -> float:
-    shared = overlap(one, other)
-    return shared / max(float(np.prod(one[2:] - one[:2]) + np.prod(other[2:] - other[:2])) - shared, 1e-9)
-
-
 def _reason(thing: Seen, cloud: CloudView, scene: SceneObjects, config: FuseConfig) -> str:
     """Why a thing is no object, as far as its points tell."""
     points = cloud.points_xy[cloud.within(core(thing.box_xyxy))]
-    if len(points) < _FEWEST:
-        met = f"the LiDAR meets fewer than {_FEWEST} points of it" if len(points) else "the LiDAR meets nothing of it"
+    if len(points) < FEWEST:
+        met = f"the LiDAR meets fewer than {FEWEST} points of it" if len(points) else "the LiDAR meets nothing of it"
         return f"{met}, and the image tells its range less surely than to {config.camera_sigma_m:g} m"
     for i, name in enumerate(scene.ids):
-        if _rectangle(scene, i).holds(points, _MARGIN_M).mean() > 1 / 2:
+        if _rectangle(scene, i).holds(points, MARGIN_M).mean() > 1 / 2:
             return f"most of its points are of object {name}"
     return f"its {len(points)} points fit no {thing.name} well enough for a probability of {config.min_probability:g}"
 
