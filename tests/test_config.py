@@ -40,6 +40,7 @@ def test_method_counts_for_every_stage() -> None:
         (["localize=3"], "write STAGE.KEY=VALUE"),
         (["cluster.range_m=[15, 0.5]"], "give the lower number first"),
         (["cluster.slice_m=[0.3, 0.3]"], "give the lower number first"),
+        (["detect.tiles=0"], r"^detect.tiles = 0: Input should be greater than .* 1 or Input should be 'auto'$"),
         (["fuse.landmark_classes=person"], r'give a list, such as \["person", "suitcase"\]'),
     ],
 )

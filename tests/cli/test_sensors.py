@@ -13,6 +13,7 @@ from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.stage import Channel, Stamped
 
 from tests.cli.calls import call, refused
@@ -106,6 +107,19 @@ def test_no_frame_is_its_own_parent(
         counts = {entry.connection.topic: entry.count for entry in recording.channels}
     assert counts.get(TF.topic, 0) == (COUNT if is_written else 0)
     assert ("odometry names no frame of its own" in capsys.readouterr().err) != is_written
+
+
+def test_clouds_of_which_none_can_be_read_say_why(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The stage after it would only say that there are no scan objects."""
+    whole = write(tmp_path / "whole.mcap", changed(SCAN, as_cloud))
+    log = tmp_path / "cut.mcap"
+    with open_recording(whole) as recording, create_recording(log) as writer:
+        for raw in recording.messages():
+            data = raw.data[:-8] if raw.connection.topic == CLOUD.topic else raw.data
+            writer.write(raw._replace(data=data))
+    words = ("run", log, "-o", tmp_path / "out.mcap", *SLICED, "--stages", "cluster,fuse")
+    line = refused(capsys, 1, *words)
+    assert f"not one message of {CLOUD.topic} could be read: {CLOUD.topic} at " in line
 
 
 def test_what_the_stages_found_is_told_where_nothing_can_be_mapped(

@@ -36,6 +36,12 @@ def test_a_gap_is_named_with_its_remedy() -> None:
     assert "sonar" not in tree
 
 
+def test_a_frame_without_a_name_is_told_as_that() -> None:
+    tree = FrameTree.of([("base", "laser", np.eye(4))])
+    with pytest.raises(RecordingError, match=r"a message names no frame, where base is asked for.*--extrinsics FILE"):
+        tree.lookup("base", "")
+
+
 def test_a_circle_of_frames_ends() -> None:
     tree = FrameTree.of([("a", "b", np.eye(4)), ("b", "a", np.eye(4))])
     with pytest.raises(RecordingError, match="no transforms lead"):

@@ -62,6 +62,13 @@ def test_layouts(layout: Layout, rows: int, padding: int) -> None:
     np.testing.assert_array_equal(found.points_m, POINTS.astype(np.float32))
 
 
+def test_a_single_row_needs_no_step_to_the_next() -> None:
+    found = decode(PointCloud2, cloud([("x", "<f4"), ("y", "<f4"), ("z", "<f4")], row_step=0))
+    np.testing.assert_array_equal(found.points_m, POINTS.astype(np.float32))
+    with pytest.raises(MessageError, match="bytes only"):
+        decode(PointCloud2, cloud([("x", "<f4"), ("y", "<f4"), ("z", "<f4")], rows=2, row_step=0))
+
+
 @pytest.mark.parametrize(
     ("layout", "changes", "said"),
     [

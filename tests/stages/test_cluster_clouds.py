@@ -35,6 +35,18 @@ def test_a_whole_cloud_has_boxes_around_what_stands_on_the_ground() -> None:
     assert set(clustered.clusters) == {0, 1}
 
 
+def test_clouds_in_which_nothing_stands_are_told_and_absurd_points_are_none() -> None:
+    """Empty clouds, and points that overflow: no LiDAR measures 10 km."""
+    mount = Transform(0, "base_footprint", "velodyne", np.array([0.0, 0.0, LIDAR_M]), UPRIGHT)
+    absurd = np.array([[1e30, 0.0, 1.0], [5.0, -1e30, 1.0], [np.nan, 1.0, 1.0], [2.0, 1.0, np.inf]], dtype=np.float32)
+    for points in (np.zeros((0, 3), np.float32), absurd):
+        message = PointCloud2(SECOND, "velodyne", points)
+        made = list(process([bundle(message, mount)], ClusterConfig(), {}))
+        assert [one.reason for one in made if isinstance(one, Omission)] == [
+            "clouds in which nothing stands on the ground"
+        ]
+
+
 def test_a_whole_cloud_is_de_skewed() -> None:
     """Of a robot that drives at 10 m/s every point was measured from where the base was at its time."""
     points, _ = cloud([Solid(12.0, 0.0, 0.4, 3.0, 1.7)])
