@@ -26,6 +26,7 @@ class LogOptions:
     start: options.Start = None
     end: options.End = None
     remap: options.Remap = None
+    time_offset: options.TimeOffset = None
     odom: options.OdometryTopic = None
     results_only: options.ResultsOnly = False
     force: options.Force = False

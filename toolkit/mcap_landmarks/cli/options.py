@@ -29,6 +29,15 @@ Start = Annotated[
 ]
 End = Annotated[str | None, typer.Option("--end", help="Log time to stop before: RFC 3339 or integer nanoseconds.")]
 Remap = Annotated[list[str] | None, typer.Option("--remap", metavar="FROM=TO", help="Read topic FROM as TO.")]
+TimeOffset = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--time-offset",
+        metavar="ROLE=SECONDS",
+        help="Seconds to add to the stamps of a role's messages: odometry, scan, second_scan, image or scene_objects; "
+        "repeatable.",
+    ),
+]
 OdometryTopic = Annotated[str | None, typer.Option("--odom", help="Odometry topic, where the log has several.")]
 ImageTopics = Annotated[
     list[str] | None,

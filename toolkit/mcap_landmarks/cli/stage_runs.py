@@ -49,14 +49,15 @@ class Given:
         return [Request(log, settings, files, span, thinning, use, given.results_only, given.force) for log in logs]
 
     def _span(self) -> "Span":
-        from mcap_landmarks.inspection.topic_roles import Choice, parse_remaps
+        from mcap_landmarks.inspection.topic_roles import Choice, parse_offsets, parse_remaps
         from mcap_landmarks.runs.bundles import Span
 
         given, scans = self.options, dict(zip(("scan", "second_scan"), self.scans.topics() or (), strict=False))
         one, several = self.images.topics()
         topics = {"odometry": given.odom, "image": one, **scans}
         known = {role: topic for role, topic in topics.items() if topic}
-        choice = Choice(known, parse_remaps(given.remap or []), several)
+        offsets_ns = parse_offsets(given.time_offset or [])
+        choice = Choice(known, parse_remaps(given.remap or []), several, offsets_ns)
         return Span(choice, time_ns(given.start, "--start"), time_ns(given.end, "--end"))
 
 

@@ -3,6 +3,7 @@
 import contextlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal, InvalidOperation
 
 from mcap_landmarks import channels
 from mcap_landmarks.errors import UsageError
@@ -36,6 +37,8 @@ class Role:
         return tuple(message.ROS_TYPE for message in (*self.messages, *self.others))
 
 
+_LARGEST_NS = 2**63
+"""Times do not reach further from the epoch."""
 _OF_CAMERAS = (channels.CAMERA_IMAGE, channels.CAMERA_INFO)
 ROLES: Mapping[Channel[Message], Role] = {
     channels.CAMERA_IMAGE: Role("image", "--image", (CompressedImage, Image)),
@@ -47,16 +50,32 @@ ROLES: Mapping[Channel[Message], Role] = {
 }
 
 
+OFFSET_ROLES: Mapping[Channel[Message], str] = {
+    channels.ODOMETRY: "odometry",
+    channels.SCAN: "scan",
+    channels.SECOND_SCAN: "second_scan",
+    channels.SCAN_OBJECTS: "scan",
+    channels.CLUSTERED_CLOUD: "scan",
+    channels.DETECTIONS: "image",
+    channels.SCENE_OBJECTS: "scene_objects",
+    channels.SCENE_VELOCITIES: "scene_objects",
+}
+"""The role whose clock stamped a channel's messages. Images keep their stamps, since annotations must match them: what
+was detected in them is corrected when it is read."""
+
+
 @dataclass(frozen=True, slots=True)
 class Choice:
     """What the user said about topics: role name to topic, FROM to TO of remapped ones, and images of several cameras.
 
-    `images` has two or more topics or the word `all`; it is empty where there is one camera.
+    `images` has two or more topics or the word `all`; it is empty where there is one camera. `offsets_ns` are added to
+    the stamps of a role's messages.
     """
 
     topics: Mapping[str, str] = field(default_factory=dict)
     remaps: Mapping[str, str] = field(default_factory=dict)
     images: tuple[str, ...] = ()
+    offsets_ns: Mapping[str, int] = field(default_factory=dict)
 
 
 def parse_remaps(texts: Sequence[str]) -> dict[str, str]:
@@ -72,6 +91,29 @@ def parse_remaps(texts: Sequence[str]) -> dict[str, str]:
             raise UsageError(f"--remap {text}: write FROM=TO, such as /robot1/odom=/odom")
         remaps[source] = target
     return remaps
+
+
+def parse_offsets(texts: Sequence[str]) -> dict[str, int]:
+    """Role to nanoseconds of texts `ROLE=SECONDS`.
+
+    Raises:
+        UsageError: a role is unknown or named twice, or the seconds are no number.
+    """
+    roles, offsets = list(dict.fromkeys(OFFSET_ROLES.values())), dict[str, int]()
+    for text in texts:
+        role, _, seconds = text.partition("=")
+        if role not in roles:
+            raise UsageError(f"--time-offset {text}: write ROLE=SECONDS with a role of {', '.join(roles)}")
+        if role in offsets:
+            raise UsageError(f"--time-offset {text}: {role} has an offset already; give one")
+        try:
+            offset_ns = Decimal(seconds) * 10**9
+            offsets[role] = round(offset_ns)
+        except (InvalidOperation, ValueError, OverflowError):
+            offset_ns = Decimal("Infinity")
+        if not abs(offset_ns) < _LARGEST_NS:
+            raise UsageError(f"--time-offset {text}: give seconds, such as {role}=-0.5")
+    return offsets
 
 
 def topics_for(role: Role, present: Collection[tuple[str, str]]) -> list[str]:

@@ -9,10 +9,17 @@ from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, ODOMETRY, TF_STATIC
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.inspection.topic_roles import ROLES, Choice, choose, could_be, message_type
 from mcap_landmarks.maps.scene_objects import usable
+from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.codec import Message, decode
+from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
+from mcap_landmarks.messages.points import PointCloud2
+from mcap_landmarks.messages.poses import Odometry, PoseStamped
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.messages.velocities import SceneVelocities
 from mcap_landmarks.recording.odometry_buffer import odometry_from
 from mcap_landmarks.recording.time_association import Association, associate
 from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage, Readable
@@ -25,6 +32,11 @@ _OF_CAMERAS = (CAMERA_INFO, DETECTIONS)
 
 Frames = Mapping[Connection, str]
 """The frames of several cameras, by the connections of their images and CameraInfos."""
+Offsets = Mapping[Connection, int]
+"""Nanoseconds to add to the stamps of connections whose clock is another one."""
+_Sensed = Odometry | PoseStamped | LaserScan | PointCloud2 | ScanObjects | ClusteredCloud | Detections | SceneObjects
+_Timed = _Sensed | SceneVelocities
+"""Messages whose stamps offsets correct: those of `OFFSET_ROLES`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,12 +132,13 @@ def read_bundles(
     reads: Sequence[Channel[Message]],
     reading: Reading,
     frames: Frames = MappingProxyType({}),
+    offsets_ns: Offsets = MappingProxyType({}),
 ) -> Iterator[Bundle]:
     """The bundles of messages by log time, one per message of the first channel of `reads`.
 
     They wait for odometry if `reads` has it, for transforms and camera information if the recording has any, and get
     of every other channel of `reads` the message nearest in time, of detections that of every camera. `reading` is kept
-    up to date; `frames` are those of several cameras, see `decoded`.
+    up to date; `frames` are those of several cameras, `offsets_ns` those of clocks, see `decoded`.
 
     A message that cannot be decoded is a loss, an unusable object is dropped; both are counted.
     """
@@ -133,7 +146,7 @@ def read_bundles(
     present = {*inputs.values()} | {TF_STATIC for entry in inputs if entry.message_type == TFMessage.ROS_TYPE}
     others = [channel for channel in reads[1:] if channel != ODOMETRY and channel in present]
     return associate(
-        decoded(raws, inputs, reading, frames),
+        decoded(raws, inputs, reading, frames, offsets_ns),
         reads[0],
         reading.association,
         with_odometry=ODOMETRY in reads,
@@ -162,10 +175,12 @@ def decoded(
     inputs: Mapping[Connection, Channel[Message]],
     reading: Reading,
     frames: Frames = MappingProxyType({}),
+    offsets_ns: Offsets = MappingProxyType({}),
 ) -> Iterator[tuple[Channel[Message], int, Message]]:
     """The messages of inputs with their channels and log times; odometry also as such, whatever message carries it.
 
     Messages of connections in `frames` get that frame: drivers often give images another one than their CameraInfo.
+    `offsets_ns` are added to stamps, of transforms only where they are odometry.
     """
     for raw in raws:
         channel = inputs.get(raw.connection)
@@ -180,10 +195,18 @@ def decoded(
             message = replace(message, frame_id=frames[raw.connection])
         if isinstance(message, SceneObjects):
             message = usable(message, reading.dropped)
+        offset_ns = offsets_ns.get(raw.connection, 0)
+        odometry = odometry_from(message) if channel == ODOMETRY else None
         if isinstance(message, TFMessage):  # one message may hold odometry and where a sensor is
             yield TF_STATIC, raw.log_time_ns, message
         else:
-            yield channel, raw.log_time_ns, message
-        odometry = odometry_from(message) if channel == ODOMETRY else None
+            yield channel, raw.log_time_ns, _later(message, raw.log_time_ns, offset_ns)
         if odometry is not None and odometry is not message:
-            yield ODOMETRY, raw.log_time_ns, odometry
+            yield ODOMETRY, raw.log_time_ns, _later(odometry, raw.log_time_ns, offset_ns)
+
+
+def _later(message: Message, log_time_ns: int, offset_ns: int) -> Message:
+    """A message with an offset added to its stamp; to the log time where the stamp is zero."""
+    if not offset_ns or not isinstance(message, _Timed):
+        return message
+    return replace(message, stamp_ns=(message.stamp_ns or log_time_ns) + offset_ns)

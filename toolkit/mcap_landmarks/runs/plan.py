@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, fields, replace
 from mcap_landmarks.channels import ODOMETRY, RESULTS
 from mcap_landmarks.config import Settings, effective, load_files
 from mcap_landmarks.errors import ToolkitError
-from mcap_landmarks.inspection.topic_roles import ROLES, Choice
+from mcap_landmarks.inspection.topic_roles import OFFSET_ROLES, ROLES, Choice
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RECORDING, StageRecord, code_hash, file_hash, is_generated
 from mcap_landmarks.messages.codec import Message
@@ -42,7 +42,7 @@ class Request:
         """For the manifest: what was asked for."""
         span = self.span
         given: dict[str, object] = {
-            **choice_options(span.choice, tuple(ROLES)),
+            **choice_options(span.choice, tuple({**ROLES, **OFFSET_ROLES})),
             "start_ns": span.start_ns,
             "end_ns": span.end_ns,
             "use": list(self.use) or None,
@@ -147,4 +147,6 @@ def choice_options(choice: Choice, reads: Sequence[Channel[Message]]) -> dict[st
     given = {entry.name: getattr(choice, entry.name) for entry in fields(choice)}
     given["topics"] = {role: topic for role, topic in choice.topics.items() if role in roles}
     given["images"] = list(choice.images) if roles & {"image", "camera_info"} else []
+    clocks = {role for channel, role in OFFSET_ROLES.items() if channel in reads}
+    given["offsets_ns"] = {role: ns for role, ns in sorted(choice.offsets_ns.items()) if role in clocks and ns}
     return {name: value for name, value in given.items() if value}

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import Self
 
-from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY
+from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, DETECTIONS, ODOMETRY
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.inspection.cameras import NO_CAMERAS, Cameras, info_frames
-from mcap_landmarks.inspection.topic_roles import cameras_of, choose
+from mcap_landmarks.inspection.topic_roles import OFFSET_ROLES, cameras_of, choose
 from mcap_landmarks.messages.codec import M
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.layered_log import LayeredLog
@@ -36,6 +36,7 @@ class StageInput:
         self.primary = self._primaries[0]
         cameras = cameras_of(log, span.choice) if {CAMERA_IMAGE, CAMERA_INFO} & {*self._inputs.values()} else NO_CAMERAS
         self.notes, self._frames = cameras.notes(), self._frames_of(cameras)
+        self._offsets_ns = self._offsets()
 
     @property
     def count(self) -> int:
@@ -45,7 +46,8 @@ class StageInput:
     def first(self, channel: Channel[M]) -> M | None:
         """See `InputLog`."""
         connections = [entry for entry, known in self._inputs.items() if known == channel]
-        messages = decoded(self._log.messages(connections), self._inputs, Reading())
+        raws = self._log.messages(connections)
+        messages = decoded(raws, self._inputs, Reading(), offsets_ns=self._offsets_ns)
         return next((message for _, _, message in messages if isinstance(message, channel.message)), None)
 
     def bundles(self, progress: Progress, thinning: Thinning = _EVERY_MESSAGE) -> Iterator[Bundle]:
@@ -55,7 +57,7 @@ class StageInput:
             UsageError: messages are to be left out by motion, and there is no odometry.
         """
         raws = chain(held_before(self._log, self._inputs, self._span.start_ns), self._raws(progress, thinning))
-        return read_bundles(raws, self._inputs, self._reads, self.reading, self._frames)
+        return read_bundles(raws, self._inputs, self._reads, self.reading, self._frames, self._offsets_ns)
 
     def by_frame(self) -> dict[str, Self]:
         """The same log for each of several cameras, whose images are primary there, by frame; none for one camera."""
@@ -76,6 +78,15 @@ class StageInput:
         frames, remaps = used.frames(), self._span.choice.remaps
         told = {entry: frames.get(remaps.get(entry.topic, entry.topic)) for entry in self._inputs}
         return {entry: frame for entry, frame in told.items() if frame is not None} or info_frames(self._log, infos)
+
+    def _offsets(self) -> dict[Connection, int]:
+        """What the user adds to stamps. Results were made of corrected ones, but detections have their images'."""
+        made = {entry.connection for layer in self._log.layers if layer.record for entry in layer.channels}
+        return {
+            connection: self._span.choice.offsets_ns.get(OFFSET_ROLES.get(channel, ""), 0)
+            for connection, channel in self._inputs.items()
+            if channel == DETECTIONS or connection not in made
+        }
 
     def _raws(self, progress: Progress, thinning: Thinning) -> Iterator[RawMessage]:
         odometry = choose(self._log, ODOMETRY, self._span.choice) if thinning.by_motion else ()
