@@ -14,9 +14,9 @@ from mcap_landmarks.diff.fields import ComparedMessages, Fields, compared, unit_
 from mcap_landmarks.diff.pairs import pair_keys
 from mcap_landmarks.diff.values import Rows
 from mcap_landmarks.errors import MessageError
-from mcap_landmarks.inspection.cameras import frame_in
 from mcap_landmarks.messages.columns import Column, Kind
 from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.header import frame_in
 from mcap_landmarks.messages.layout import Layout, layout_of
 from mcap_landmarks.messages.typestore import definition, typestore
 from mcap_landmarks.progress import Progress

@@ -9,6 +9,7 @@ from mcap_landmarks.channels import RESULTS
 from mcap_landmarks.errors import MessageError, UsageError
 from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.header import frame_in
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.stage import Connection, Readable
 
@@ -101,12 +102,6 @@ def _same_optics(info: CameraInfo, other: CameraInfo) -> bool:
     ) and all(
         np.array_equal(getattr(info, name), getattr(other, name)) for name in ("distortion", "intrinsics", "projection")
     )
-
-
-def frame_in(data: bytes | memoryview) -> str:
-    """The frame of a message that begins with a header, without decoding the rest."""
-    size = int.from_bytes(data[12:16], "little" if data[1] & 1 else "big")
-    return bytes(data[16 : 16 + max(size - 1, 0)]).decode(errors="replace")
 
 
 def info_topic(image: str, frame: str, infos: Mapping[str, str]) -> str | None:

@@ -1,6 +1,5 @@
 """One look at all sensors of a log, without running anything: times, frames, beams."""
 
-import struct
 from array import array
 from collections import Counter
 from collections.abc import Container, Iterable, Mapping, Sequence
@@ -12,9 +11,9 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.geometry.frames import plain
-from mcap_landmarks.inspection.cameras import frame_in
 from mcap_landmarks.inspection.open_logs import OpenLog
 from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.header import frame_in, stamp_in
 from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.poses import Odometry
 from mcap_landmarks.messages.scan import LaserScan
@@ -29,7 +28,6 @@ SENSORS = ("image", "camera_info", "scan", "odometry", "scene_objects")
 _MOST_SCANS = 400
 _MOST_TRANSFORMS = 300
 """So many of a topic are decoded, spread over the log or its first: which beams and frames there are shows soon."""
-_BIG, _LITTLE = struct.Struct(">iI"), struct.Struct("<iI")
 
 
 @dataclass(slots=True)
@@ -129,7 +127,7 @@ def _transforms(raw: RawMessage, found: Survey, seen: Counter[Connection]) -> No
 
 def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
     ros_type, number = raw.connection.message_type, len(sensor.log_ns)
-    stamp_ns = _first_stamp_ns(raw.data) if ros_type == TFMessage.ROS_TYPE else _stamp_ns(raw.data)
+    stamp_ns = _first_stamp_ns(raw.data) if ros_type == TFMessage.ROS_TYPE else stamp_in(raw.data)
     sensor.log_ns.append(raw.log_time_ns)
     sensor.stamp_ns.append(stamp_ns)
     if ros_type == LaserScan.ROS_TYPE and number % stride == 0:
@@ -146,14 +144,6 @@ def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
 def _first_stamp_ns(data: bytes | memoryview) -> int:
     transforms = decode(TFMessage, data).transforms
     return transforms[0].stamp_ns if transforms else 0
-
-
-def _stamp_ns(data: bytes | memoryview) -> int:
-    """The stamp of a message that begins with a header, without decoding the rest."""
-    if len(data) < 12:
-        raise MessageError("it is shorter than a header")
-    seconds, rest = (_LITTLE if data[1] & 1 else _BIG).unpack_from(data, 4)
-    return int(seconds) * 10**9 + int(rest)
 
 
 def _look_at_scan(scan: LaserScan, sensor: Sensor, returns: dict[str, Returns]) -> None:
