@@ -13,12 +13,13 @@ from mcap_landmarks.cli.main import run
 from mcap_landmarks.evaluation.read import read_reference
 from mcap_landmarks.evaluation.trajectory import Trajectory, interpolated
 from mcap_landmarks.geometry.se2 import Array
-from mcap_landmarks.inspection.topic_roles import Choice
 from mcap_landmarks.maps.database import read_map, write_map
 from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.recording.layered_log import LayeredLog, own_layer
 from mcap_landmarks.recording.reader import open_recording
-from mcap_landmarks.runs.bundles import Reading, inputs_of, read_bundles
+from mcap_landmarks.runs.bundles import Span
+from mcap_landmarks.runs.stage_input import StageInput
 from mcap_landmarks.stage import Bundle, Stamped
 from mcap_landmarks.stages.localize import STAGE, LocalizeConfig, process
 
@@ -65,9 +66,8 @@ def _counts(log: Path, database: Path) -> tuple[int, int, int, int]:
     truth = read_reference(log)[0].trajectory
     assert truth is not None
     with open_recording(log) as recording:
-        inputs = inputs_of(recording, STAGE.reads, STAGE.reads, Choice())
-        raws = recording.messages(tuple(inputs))
-        bundles = [_modulo(bundle) for bundle in read_bundles(raws, inputs, STAGE.reads, Reading())]
+        source = StageInput(STAGE, LayeredLog(log, [own_layer(recording)]), Span())
+        bundles = [_modulo(bundle) for bundle in source.bundles(lambda _count: None)]
     many = {bundle.log_time_ns for bundle in bundles if len(_objects(bundle)) >= _MANY}
     results = process(bundles, LocalizeConfig(), {"map": database})
     poses = {stamped.log_time_ns: _pose(stamped) for stamped in results if stamped.channel == POSE}

@@ -2,16 +2,18 @@
 
 import numpy as np
 import pytest
-from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, ODOMETRY, SCENE_OBJECTS, TF_STATIC
+from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, SCENE_OBJECTS, TF_STATIC
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.poses import Odometry, PoseStamped
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
-from mcap_landmarks.recording.odometry_buffer import odometry_from
+from mcap_landmarks.recording.odometry_track import odometry_from
 from mcap_landmarks.recording.time_association import WINDOW_NS, Association, associate
 from mcap_landmarks.stage import Bundle
+
+from tests.recording.tracks import track
 
 SECOND = 10**9
 
@@ -26,11 +28,9 @@ def odometry(stamp_ns: int, *pose: float) -> Odometry:
 
 def bundles(*messages: tuple[int, SceneObjects | Odometry]) -> tuple[list[Bundle], Association]:
     counts = Association()
-    stream = (
-        (SCENE_OBJECTS if isinstance(message, SceneObjects) else ODOMETRY, log_time, message)
-        for log_time, message in messages
-    )
-    return list(associate(stream, SCENE_OBJECTS, counts)), counts
+    stream = [(SCENE_OBJECTS, at, message) for at, message in messages if isinstance(message, SceneObjects)]
+    steps = [(message.stamp_ns or at, message) for at, message in messages if isinstance(message, Odometry)]
+    return list(associate(stream, SCENE_OBJECTS, counts, odometry=track(steps))), counts
 
 
 def test_odometry_is_interpolated_on_the_arc() -> None:
@@ -67,17 +67,17 @@ def test_without_a_partner_a_bundle_goes_alone() -> None:
     assert counts.without_odometry == counts.bundles == 3
 
 
-def test_odometry_that_goes_backwards_or_is_not_finite_is_counted() -> None:
-    found, counts = bundles(
-        (0, odometry(1, 0, 0, 0)),
-        (1, odometry(SECOND, 1, 0, 0)),
-        (2, odometry(SECOND // 2, 9, 9, 9)),
-        (3, odometry(2 * SECOND, np.nan, 0, 0)),
-        (4, scene(SECOND)),
-    )
-    assert (counts.odometry_out_of_order, counts.odometry_not_finite) == (1, 1)
-    assert found[0].odometry is not None
-    np.testing.assert_allclose(found[0].odometry.odom_from_base, [1, 0, 0])
+def test_nothing_is_known_between_two_pieces() -> None:
+    steps = [(at * SECOND, odometry(at * SECOND, at, 0, 0)) for at in (1, 2, 3, 4)]
+    scenes = [(SCENE_OBJECTS, at, scene(at)) for at in (3 * SECOND // 2, 5 * SECOND // 2, 7 * SECOND // 2)]
+    counts = Association()
+    found = list(associate(scenes, SCENE_OBJECTS, counts, odometry=track(steps, [0, 0, 1, 1])))
+    assert [bundle.odometry and (bundle.odometry.odom_from_base[0], bundle.odometry.piece) for bundle in found] == [
+        (1.5, 0),
+        None,
+        (3.5, 1),
+    ]
+    assert counts.without_odometry == 1
 
 
 @pytest.mark.parametrize("gap", [1, 10 * SECOND])
@@ -120,7 +120,7 @@ def test_held_messages_are_the_latest_so_far_and_transforms_gather() -> None:
         (TF_STATIC, 5, mounts(laser=3.0)),
         (SCENE_OBJECTS, 6, scene(7)),
     ]
-    found = list(associate(messages, SCENE_OBJECTS, counts, with_odometry=False, held=[TF_STATIC]))
+    found = list(associate(messages, SCENE_OBJECTS, counts, held=[TF_STATIC]))
     held = [bundle.get(TF_STATIC) for bundle in found]
     assert [heights(message) for message in held] == [
         {"laser": 1.0},  # a bundle waits for the first transforms
@@ -135,7 +135,7 @@ def test_a_bundle_that_waits_gets_no_calibration_of_later_ones() -> None:
     infos = [(CAMERA_INFO, at * SECOND, info(at * SECOND)) for at in (20, 40, 60)]
     scenes = [(SCENE_OBJECTS, at * SECOND, scene(at * SECOND)) for at in (10, 20, 40, 60)]
     messages = sorted([*infos, *scenes], key=lambda entry: entry[1])
-    found = associate(messages, SCENE_OBJECTS, Association(), with_odometry=True, held=[CAMERA_INFO])
+    found = associate(messages, SCENE_OBJECTS, Association(), held=[CAMERA_INFO])
     held = [bundle.get(CAMERA_INFO) for bundle in found]
     assert [message and message.stamp_ns // SECOND for message in held] == [20, 20, 40, 60]
 
@@ -157,7 +157,7 @@ def heights(message: TFMessage | None) -> dict[str, float]:
 
 def test_nobody_gets_held_messages_that_never_come() -> None:
     messages = [(SCENE_OBJECTS, i * SECOND, scene(i * SECOND + 1)) for i in range(6)]
-    found = list(associate(messages, SCENE_OBJECTS, Association(), with_odometry=False, held=[TF_STATIC]))
+    found = list(associate(messages, SCENE_OBJECTS, Association(), held=[TF_STATIC]))
     assert len(found) == 6
     assert all(bundle.get(TF_STATIC) is None for bundle in found)
 
@@ -168,7 +168,7 @@ def beside(scenes_ms: list[int], images_ms: list[int], late_ms: int = 0) -> tupl
     messages = [(SCENE_OBJECTS, at, scene(at * 10**6)) for at in scenes_ms]
     messages += [(DETECTIONS, at + late_ms, image(at * 10**6)) for at in images_ms]
     stream = [(channel, at * 10**6, message) for channel, at, message in sorted(messages, key=lambda entry: entry[1])]
-    found = associate(stream, SCENE_OBJECTS, counts, with_odometry=False, beside=[DETECTIONS])
+    found = associate(stream, SCENE_OBJECTS, counts, beside=[DETECTIONS])
     partners = [bundle.get(DETECTIONS) for bundle in found]
     return [None if partner is None else partner.stamp_ns // 10**6 for partner in partners], counts
 
@@ -205,9 +205,7 @@ def of_cameras(scenes_ms: list[int], images_ms: dict[str, list[int]], late_ms: i
     for frame, times in images_ms.items():
         messages += [(at + late_ms * (frame == "late"), DETECTIONS, image(at * 10**6, frame)) for at in times]
     stream = [(channel, at * 10**6, message) for at, channel, message in sorted(messages, key=lambda entry: entry[0])]
-    bundles = associate(
-        stream, SCENE_OBJECTS, Association(), with_odometry=False, beside=[DETECTIONS], by_frame={DETECTIONS: 1}
-    )
+    bundles = associate(stream, SCENE_OBJECTS, Association(), beside=[DETECTIONS], by_frame={DETECTIONS: 1})
     return [{one.frame_id: one.stamp_ns // 10**6 for one in bundle.each(DETECTIONS)} for bundle in bundles]
 
 
@@ -236,7 +234,6 @@ def test_what_is_held_of_every_camera_is_awaited() -> None:
                 stream,
                 SCENE_OBJECTS,
                 Association(),
-                with_odometry=False,
                 held=[CAMERA_INFO],
                 by_frame={CAMERA_INFO: count},
             )

@@ -2,19 +2,15 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
-from mcap_landmarks.channels import DETECTIONS, ODOMETRY, SCAN, SCAN_OBJECTS, SCENE_OBJECTS, TF_STATIC
+from mcap_landmarks.channels import DETECTIONS, ODOMETRY, SCAN, SCAN_OBJECTS, SCENE_OBJECTS
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.inspection.topic_roles import Choice, parse_offsets
-from mcap_landmarks.messages.codec import Message, decode, encode
-from mcap_landmarks.messages.poses import Odometry
-from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.recording.reader import open_recording
-from mcap_landmarks.runs.bundles import Reading, Span, decoded
+from mcap_landmarks.runs.bundles import Span
 from mcap_landmarks.runs.pipeline import LogRun, run_stages
 from mcap_landmarks.runs.plan import Request, choice_options
-from mcap_landmarks.stage import Channel, Connection, RawMessage
 
 from tests.runs.chain import STEP_NS, raw_log, two_posts
 
@@ -48,21 +44,6 @@ def test_a_stage_is_told_of_the_clocks_that_it_reads() -> None:
     assert choice_options(choice, (DETECTIONS,)) == {"offsets_ns": {"image": 7}}
     assert choice_options(choice, (SCAN, ODOMETRY)) == {"offsets_ns": {"odometry": 5}}
     assert choice_options(choice, (SCAN,)) == {}
-
-
-def test_odometry_is_moved_whatever_carries_it_and_where_its_stamp_is_zero() -> None:
-    raw = Connection("/odom", Odometry.ROS_TYPE, b"")
-    tree = Connection("/tf", TFMessage.ROS_TYPE, b"")
-    frames = ("odom", "base_footprint")
-    odometry = Odometry.planar(0, frames, (0, 0, 0), np.zeros((3, 3)))
-    transforms = TFMessage((Transform.planar(100, frames, (0, 0, 0)),))
-    raws = [RawMessage(raw, 1000, 1000, 0, encode(odometry)), RawMessage(tree, 1000, 1000, 0, encode(transforms))]
-    inputs: dict[Connection, Channel[Message]] = {raw: ODOMETRY, tree: ODOMETRY}
-    found = list(decoded(raws, inputs, Reading(), offsets_ns={raw: 10, tree: -30}))
-    assert [message.stamp_ns for _, _, message in found if isinstance(message, Odometry)] == [1010, 70]
-    (kept,) = (message for channel, _, message in found if channel == TF_STATIC)
-    assert isinstance(kept, TFMessage)
-    assert kept.transforms[0].stamp_ns == 100
 
 
 def test_stamps_are_corrected_once_and_images_keep_theirs(tmp_path: Path) -> None:

@@ -52,7 +52,7 @@ def aligned_rmse(landmark_map: LandmarkMap, classes: tuple[str, ...], positions:
 def test_a_loop_with_repeated_classes_closes() -> None:
     classes, positions = ring()
     log = observe(drive(circle(), classes, positions, seed=1), CONFIG)
-    landmark_map, trajectories, _ = solve([log], None, CONFIG)
+    landmark_map, trajectories, *_ = solve([log], None, CONFIG)
     assert sorted(np.array(landmark_map.classes)[~landmark_map.tentative]) == sorted(classes)
     assert aligned_rmse(landmark_map, classes, positions) < 0.03
     truth = circle()

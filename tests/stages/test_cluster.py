@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mcap_landmarks.channels import ODOMETRY, SCAN, SCAN_FILTERED, SCAN_OBJECTS, SECOND_SCAN, TF_STATIC
+from mcap_landmarks.channels import SCAN, SCAN_FILTERED, SCAN_OBJECTS, SECOND_SCAN, TF_STATIC
 from mcap_landmarks.config import stage_config
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.geometry.se2 import Array, compose, exp, transform_points
@@ -19,10 +19,11 @@ from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.recording.time_association import Association, associate
-from mcap_landmarks.stage import Bundle, Omission
+from mcap_landmarks.stage import Bundle, Channel, Omission
 from mcap_landmarks.stages.cluster import process
 
 from tests.lidar.scans import ANGLES_RAD, Thing, box, disc, ranges
+from tests.recording.tracks import track
 
 SECOND = 10**9
 THINGS = [disc(3.0, 0.6, 0.15), box(2.5, -1.0, 0.4, 0.5, 0.28)]
@@ -147,12 +148,11 @@ def drive(
     With `stamped_s` they are clouds, stamped so long after the first of their points.
     """
     rate = 30
-    messages = [
-        (ODOMETRY, SECOND + i * SECOND // rate, Odometry.planar(
-            SECOND + i * SECOND // rate, ("odom", "base_footprint"), exp(velocity * i / rate), np.zeros((3, 3))
-        ))
-        for i in range(rate * (count + 2))
-    ]  # fmt: skip
+    driven, frames = [], ("odom", "base_footprint")
+    for i in range(rate * (count + 2)):
+        at = SECOND + i * SECOND // rate
+        driven.append((at, Odometry.planar(at, frames, exp(velocity * i / rate), np.zeros((3, 3)))))
+    messages: list[tuple[Channel[Message], int, Message]] = []
     for k in range(count):
         start = SECOND + SECOND // 3 + k * SECOND
         times = (start - SECOND) / 1e9 + turn_s * np.arange(360) / 360
@@ -164,7 +164,7 @@ def drive(
         messages.append((SCAN, start + int(turn_s * SECOND), message))
     messages.append((TF_STATIC, 0, TFMessage((mounting(),))))
     messages.sort(key=lambda entry: entry[1])
-    return list(associate(messages, SCAN, Association(), held=[TF_STATIC]))
+    return list(associate(messages, SCAN, Association(), odometry=track(driven), held=[TF_STATIC]))
 
 
 def cloud_of(distances: Array, stamp_ns: int, turn_s: float, stamped_s: float) -> PointCloud2:

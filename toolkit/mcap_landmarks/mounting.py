@@ -17,7 +17,7 @@ from mcap_landmarks.stage import Bundle
 
 Edge = tuple[str, str, Array]
 
-_BASES = (BASE_FRAME, "base_link")
+BASES = (BASE_FRAME, "base_link")
 _WORLDS = (MAP_FRAME, ODOM_FRAME, "odom_combined", "world", "earth")
 
 
@@ -49,11 +49,7 @@ class Mounting:
     def base(self, bundle: Bundle, sensor: str) -> str:
         """The robot's base frame: `base_footprint`, `base_link`, or what else carries the sensor; itself if nothing."""
         self._update(bundle)
-        for name in _BASES:
-            if name in self._tree:
-                return name
-        names = [name for name, _ in self._tree.chain(sensor)]
-        return next((name for name in reversed(names) if name not in _WORLDS), plain(sensor))
+        return base_in(self._tree, sensor)
 
     def _update(self, bundle: Bundle) -> None:
         message = bundle.get(TF_STATIC)
@@ -64,6 +60,15 @@ class Mounting:
             for step in message.transforms
         ]
         self._seen, self._tree, self._found = message, FrameTree.of([*edges, *self._own]), {}
+
+
+def base_in(tree: FrameTree, sensor: str) -> str:
+    """The robot's own frame: `base_footprint`, `base_link`, or what else carries a sensor; itself if nothing."""
+    for name in BASES:
+        if name in tree:
+            return name
+    names = [name for name, _ in tree.chain(sensor)]
+    return next((name for name in reversed(names) if name not in _WORLDS), plain(sensor))
 
 
 def read_extrinsics(path: Location) -> list[Edge]:

@@ -118,6 +118,7 @@ class OdometryAt:
     the length of the path and the sum of all turning since the log began, so that a loop back to the start counts.
     `velocity` (3,) is the base's own: forward and left in m/s and turning in rad/s, over the two messages around.
     `samples` are there where the bundle's message took a while to measure, and span that while if the log does.
+    Between poses of another `piece` nothing is known.
     """
 
     frame_id: str
@@ -127,6 +128,7 @@ class OdometryAt:
     turned_rad: float
     velocity: Array = field(default_factory=lambda: np.zeros(3))
     samples: OdometrySamples | None = None
+    piece: int = 0
 
     def base_from_then(self, stamp_ns: int, times_ns: NDArray[np.int64]) -> Array:
         """Where the base was at some times (N,), as poses (N, 3) in the base frame at `stamp_ns`.

@@ -38,7 +38,9 @@ TimeOffset = Annotated[
         "repeatable.",
     ),
 ]
-OdometryTopic = Annotated[str | None, typer.Option("--odom", help="Odometry topic, where the log has several.")]
+OdometryTopic = Annotated[
+    str | None, typer.Option("--odom", help="Odometry topic, where the log has several; none to go on without.")
+]
 ImageTopics = Annotated[
     list[str] | None,
     typer.Option(

@@ -66,7 +66,7 @@ class ObjectMotions:
     def add(self, scene: SceneObjects, odometry: OdometryAt | None) -> SceneVelocities | None:
         """The velocities of a scene's objects, now that it was seen; None without odometry."""
         if odometry is None:
-            self._motions.clear()
+            self.forget()
             return None
         self._forget(scene.stamp_ns)
         widened = np.array([self._widened.pop(name, 1.0) for name in scene.ids])
@@ -88,6 +88,11 @@ class ObjectMotions:
             np.array([back @ velocity.covariance @ back.T for _, _, velocity in told if velocity]).reshape(-1, 2, 2),
             np.array([motion.moving for _, motion, _ in told], dtype=np.float64),
         )
+
+    def forget(self) -> None:
+        """Odometry begins anew: nothing is known to be where it was."""
+        self._motions.clear()
+        self._classes.clear()
 
     def _forget(self, stamp_ns: int) -> None:
         gone = [name for name, one in self._motions.items() if abs(stamp_ns - one.last.stamp_ns) > _MEMORY_NS]

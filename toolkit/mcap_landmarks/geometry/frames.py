@@ -20,11 +20,16 @@ def rigid(translation_m: ArrayLike, rotation_xyzw: ArrayLike) -> Array:
         RecordingError: the quaternion is zero, or a number is not finite.
     """
     translation, quaternion = np.asarray(translation_m, dtype=np.float64), np.asarray(rotation_xyzw, dtype=np.float64)
-    if not (np.isfinite(translation).all() and np.isfinite(quaternion).all() and quaternion.any()):
+    if not is_rigid(translation, quaternion):
         raise RecordingError(f"{translation.tolist()}, {quaternion.tolist()} is no rigid transform; {REMEDY}")
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = Rotation.from_quat(quaternion).as_matrix(), translation
     return matrix
+
+
+def is_rigid(translation_m: ArrayLike, rotation_xyzw: ArrayLike) -> bool:
+    """Whether a translation (3,) and a quaternion (4,) make a transform: finite, and the quaternion is not zero."""
+    return bool(np.isfinite([*np.asarray(translation_m), *np.asarray(rotation_xyzw)]).all() and np.any(rotation_xyzw))
 
 
 def inverse(dst_from_src: Array) -> Array:

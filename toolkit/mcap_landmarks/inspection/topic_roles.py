@@ -50,6 +50,8 @@ ROLES: Mapping[Channel[Message], Role] = {
 }
 
 
+NO_TOPIC = "none"
+"""In place of the topic of odometry: go on without it."""
 OFFSET_ROLES: Mapping[Channel[Message], str] = {
     channels.ODOMETRY: "odometry",
     channels.SCAN: "scan",
@@ -168,6 +170,8 @@ def choose(recording: Readable, channel: Channel[Message], choice: Choice) -> tu
 def _chosen(recording: Readable, channel: Channel[Message], named: Named, choice: Choice) -> list[str]:
     """The topics of a role: the one that the user chose, else what fits."""
     role = ROLES[channel]
+    if channel == channels.ODOMETRY and choice.topics.get(role.name) == NO_TOPIC:
+        return []
     if role.name in choice.topics:
         return [choice.topics[role.name]]
     fitting = topics_for(role, [(topic, connection.message_type) for topic, connection in named])

@@ -30,7 +30,7 @@ class Tracks:
         """
         self._tracks = [track for track in self._tracks if abs(stamp_ns - track.seen_ns) <= self._memory_ns]
         if odom_from_base is None:
-            self._tracks = []
+            self.forget()
             return tuple(self._new() for _ in range(len(places_xy)))
         places = transform_points(odom_from_base, places_xy)
         matched = self._match(places)
@@ -40,6 +40,10 @@ class Tracks:
                 self._tracks.append(matched[i])
             matched[i].place_xy, matched[i].seen_ns = place, stamp_ns
         return tuple(matched[i].name for i in range(len(places)))
+
+    def forget(self) -> None:
+        """Odometry begins anew: nothing is known to be where it was."""
+        self._tracks = []
 
     def _match(self, places: Array) -> dict[int, _Track]:
         if not (len(places) and self._tracks):
@@ -52,3 +56,17 @@ class Tracks:
     def _new(self) -> str:
         self._count += 1
         return str(self._count)
+
+
+@dataclass(slots=True)
+class PieceChange:
+    """Whether odometry began anew since the last scan: what was seen before has no place any more."""
+
+    _latest: int | None = None
+
+    def at(self, piece: int | None) -> bool:
+        """Whether a scan's piece of odometry, None without odometry, is another one than that before."""
+        if piece is None:
+            return False
+        before, self._latest = self._latest, piece
+        return before is not None and before != piece

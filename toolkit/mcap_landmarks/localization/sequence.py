@@ -43,7 +43,8 @@ class SequenceLocalizer:
         self._bundles_at_m: deque[float] = deque()
 
     def localize(self, scene: SceneObjects, odometry: OdometryAt | None) -> Match:
-        """Match the next bundle; without odometry by itself, and what came before is forgotten.
+        """Match the next bundle; without odometry by itself. Then, and where odometry
+        begins anew, what came before is forgotten.
 
         Raises:
             MapError: lengths in the scene and in the map differ so much that one has the wrong unit.
@@ -52,6 +53,8 @@ class SequenceLocalizer:
             self._reset()
             return self._matcher.match([scene])[0]
         objects = self._matcher.objects(scene)
+        if self._before is not None and self._before.piece != odometry.piece:
+            self._reset()
         self._predict(odometry)
         old = self._local_map.numbers
         numbers = self._local_map.update(objects.points_xy, objects.covariances, objects.probabilities)

@@ -21,8 +21,12 @@ class LogTrajectory:
 
 
 class BuiltMap(NamedTuple):
-    """A map, one trajectory in it per log, and how the solver ended; None where the method has none."""
+    """A map, one trajectory in it per log, and how the solver ended; None where the method has none.
+
+    `left_out` counts per log the bundles that could not be laid on the rest.
+    """
 
     landmark_map: LandmarkMap
     trajectories: list[LogTrajectory]
     termination: Termination | None
+    left_out: tuple[int, ...] = ()

@@ -38,19 +38,47 @@ def solve_jointly(logs: Sequence[LogObservations], prior: LandmarkMap | None, co
     _check_seen(logs)
     names = sorted({name for log in logs for name in log.classes} | set(prior.classes if prior else ()))
     id_of_class = {name: i for i, name in enumerate(names)}
-    class_ids = [np.array([id_of_class[name] for name in log.classes], dtype=np.int64) for log in logs]
-    submaps = [build_submap(log, ids, config) for log, ids in zip(logs, class_ids, strict=True)]
+    parts = _parts(logs)
+    submaps = [build_submap(part, _ids(part, id_of_class), config) for _, part in parts]
     known = _placed(prior, id_of_class) if prior is not None else None
-    merged = merge_logs(submaps, known, config)
-    numbers = [_numbers(submap, of_log) for submap, of_log in zip(submaps, merged.of_log, strict=True)]
-    labelled = [_labelled(log, number) for log, number in zip(logs, numbers, strict=True)]
-    solution = solve_map(labelled, config, _known(prior, config))
-    landmark_map = _map_of(logs, numbers, merged, solution, names, prior, config)
-    trajectories = [
-        LogTrajectory(log.stamps_ns, log.log_times_ns, poses)
-        for log, poses in zip(logs, solution.trajectories, strict=True)
-    ]
-    return BuiltMap(landmark_map, trajectories, solution.termination)
+    merged = merge_logs(submaps, known, config, _spare(parts))
+    rows = [row for row, of_log in enumerate(merged.of_log) if of_log is not None]
+    laid = [parts[row] for row in rows]
+    numbers = [_numbers(submaps[row], merged.of_log[row]) for row in rows]
+    solution = solve_map([_labelled(*one) for one in zip(laid, numbers, strict=True)], config, _known(prior, config))
+    landmark_map = _map_of(laid, numbers, merged, solution, names, prior, config)
+    trajectories, left_out = _trajectories(logs, laid, solution)
+    return BuiltMap(landmark_map, trajectories, solution.termination, left_out)
+
+
+def _parts(logs: Sequence[LogObservations]) -> list[tuple[int, LogObservations]]:
+    """The pieces of all logs, each with the number of its log."""
+    return [(i, part) for i, log in enumerate(logs) for part in log.pieces()]
+
+
+def _spare(parts: Sequence[tuple[int, LogObservations]]) -> list[int]:
+    """The rows of parts that may be left out: of a log whose odometry began anew all but the first."""
+    return [row for row in range(1, len(parts)) if parts[row][0] == parts[row - 1][0]]
+
+
+def _ids(log: LogObservations, id_of_class: Mapping[str, int]) -> Ints:
+    """The class ids (N,) of a log's objects."""
+    return np.array([id_of_class[name] for name in log.classes], dtype=np.int64)
+
+
+def _trajectories(
+    logs: Sequence[LogObservations], laid: Sequence[tuple[int, LogObservations]], solution: MapSolution
+) -> tuple[list[LogTrajectory], tuple[int, ...]]:
+    """Each log's trajectory, of its parts that were laid by time, and the number of its other bundles."""
+    found, left_out = list[LogTrajectory](), list[int]()
+    for i, log in enumerate(logs):
+        own = [(part, poses) for (k, part), poses in zip(laid, solution.trajectories, strict=True) if k == i]
+        own.sort(key=lambda one: int(one[0].stamps_ns[0]))
+        stamps_ns = np.concatenate([part.stamps_ns for part, _ in own])
+        log_times_ns = np.concatenate([part.log_times_ns for part, _ in own])
+        found.append(LogTrajectory(stamps_ns, log_times_ns, np.concatenate([poses for _, poses in own])))
+        left_out.append(len(log.stamps_ns) - len(stamps_ns))
+    return found, tuple(left_out)
 
 
 def _check_seen(logs: Sequence[LogObservations]) -> None:
@@ -74,12 +102,14 @@ def _placed(prior: LandmarkMap, id_of_class: Mapping[str, int]) -> tuple[Ints, A
     return np.array([id_of_class[name] for name in prior.classes], dtype=np.int64), prior.positions_xy
 
 
-def _numbers(submap: Submap, of_log: Ints) -> Ints:
+def _numbers(submap: Submap, of_log: Ints | None) -> Ints:
     """The number (N,) of each observation's landmark in the map of all logs."""
+    assert of_log is not None  # noqa: S101 - only logs that were laid on the map are asked for
     return np.where(submap.landmark == UNLABELLED, UNLABELLED, of_log[submap.landmark])
 
 
-def _labelled(log: LogObservations, number: Ints) -> LandmarkObservations:
+def _labelled(part: tuple[int, LogObservations], number: Ints) -> LandmarkObservations:
+    log = part[1]
     seen = np.flatnonzero(number != UNLABELLED)
     polar = polar_from_points(log.points_xy[seen], log.covariances[seen])
     return LandmarkObservations(log.odom_from_base[0], motions_of(log), log.bundle[seen], number[seen], *polar)
@@ -94,7 +124,7 @@ def _known(prior: LandmarkMap | None, config: BuildMapConfig) -> KnownLandmarks 
 
 
 def _map_of(
-    logs: Sequence[LogObservations],
+    laid: Sequence[tuple[int, LogObservations]],
     numbers: Sequence[Ints],
     merged: MergedLandmarks,
     solution: MapSolution,
@@ -104,15 +134,15 @@ def _map_of(
 ) -> LandmarkMap:
     """The solved landmarks with how often, how large and in which groups they were seen."""
     radii, measured = np.zeros(len(merged.class_ids)), np.zeros(len(merged.class_ids), dtype=np.int64)
-    sources, fitting = list(prior.sources) if prior else [], list[tuple[Ints, Ints]]()
-    for log, number, weight in zip(logs, numbers, solution.weights, strict=True):
+    used, fitting = Counter[int](), list[tuple[Ints, Ints]]()
+    for (i, log), number, weight in zip(laid, numbers, solution.weights, strict=True):
         seen = np.flatnonzero(number != UNLABELLED)
         fits = seen[weight > _WRONG]
         fitting.append((number[fits], log.stamps_ns[log.bundle[fits]]))
         sized = fits[log.radii_m[fits] > 0]
         np.add.at(radii, number[sized], log.radii_m[sized])
         np.add.at(measured, number[sized], 1)
-        sources.append(MapSource("recording", log.fingerprint, log.bundles, len(np.unique(log.bundle[fits]))))
+        used[i] += len(np.unique(log.bundle[fits]))
     row = solution.number
     ids = [f"l{number + 1}" for number in row]
     radius = radii[row] / np.maximum(measured[row], 1)
@@ -135,10 +165,19 @@ def _map_of(
         radius,
         observations,
         np.logical_not(sure),
-        groups_of(logs, numbers, solution.trajectories, name_of),
-        tuple(sources),
+        groups_of([log for _, log in laid], numbers, solution.trajectories, name_of),
+        _sources(laid, used, prior),
         prior.frame if prior else "map",
     )
+
+
+def _sources(
+    laid: Sequence[tuple[int, LogObservations]], used: Mapping[int, int], prior: LandmarkMap | None
+) -> tuple[MapSource, ...]:
+    """What the map is made from; the first part of a log counts all of its bundles."""
+    wholes = dict(reversed(laid))
+    own = [MapSource("recording", wholes[i].fingerprint, wholes[i].bundles, used[i]) for i in sorted(wholes)]
+    return (*(prior.sources if prior else ()), *own)
 
 
 def _definite(covariances: Array) -> Array:

@@ -1,6 +1,6 @@
 """Landmarks that several logs saw, each in a frame of its own, as one numbered list."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,21 +26,26 @@ _BEYOND_REACH = 1e3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MergedLandmarks:
-    """G landmarks of all logs: class_ids (G,), rough positions (G, 2); per log, the number (L,) of its L landmarks."""
+    """G landmarks of all logs: class_ids (G,), rough positions (G, 2); per log, the number (L,) of its L landmarks.
+
+    None for a log that may be left out and could not be laid on the others.
+    """
 
     class_ids: Ints
     positions_xy: Array
-    of_log: tuple[Ints, ...]
+    of_log: tuple[Ints | None, ...]
 
 
-def merge_logs(logs: Sequence[Submap], known: tuple[Ints, Array] | None, config: BuildMapConfig) -> MergedLandmarks:
+def merge_logs(
+    logs: Sequence[Submap], known: tuple[Ints, Array] | None, config: BuildMapConfig, spare: Collection[int] = ()
+) -> MergedLandmarks:
     """Number the landmarks of all logs; those of a map that exists already, `known` (Q,) and (Q, 2), come first.
 
     Logs are merged one by one, whichever can be laid on what is there; landmarks of a class within three times
     `join_tolerance_m` of each other are then the same one.
 
     Raises:
-        MapError: a log cannot be laid on the others, or fits in several ways.
+        MapError: a log that is not `spare` cannot be laid on the others, or fits in several ways.
     """
     numbers: dict[int, Ints] = {}
     if known is None:
@@ -63,12 +68,14 @@ def merge_logs(logs: Sequence[Submap], known: tuple[Ints, Array] | None, config:
             positions = np.concatenate([positions, there[new]])
             break
         else:
-            lost = ", ".join(str(i + 1) for i in range(len(logs)) if i not in numbers)
+            lost = ", ".join(str(i + 1) for i in range(len(logs)) if i not in {*numbers, *spare})
+            if not lost:
+                break
             raise MapError(
                 f"log {lost} cannot be laid on the rest of the map: too few landmarks in common, or several ways fit; "
                 "map it on its own, or add a log that overlaps with both"
             )
-    return MergedLandmarks(class_ids, positions, tuple(numbers[i] for i in range(len(logs))))
+    return MergedLandmarks(class_ids, positions, tuple(numbers.get(i) for i in range(len(logs))))
 
 
 def _match(class_ids: Ints, positions: Array, map_class_ids: Ints, map_xy: Array, reach_m: float) -> Ints:

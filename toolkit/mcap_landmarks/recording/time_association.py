@@ -5,9 +5,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from mcap_landmarks.messages.codec import Message
-from mcap_landmarks.messages.poses import Odometry
 from mcap_landmarks.messages.transforms import TFMessage, Transform
-from mcap_landmarks.recording.odometry_buffer import WIDEST_GAP_NS, OdometryBuffer
+from mcap_landmarks.recording.odometry_track import WIDEST_GAP_NS, OdometryTrack
 from mcap_landmarks.stage import Bundle, Channel
 
 WINDOW_NS = WIDEST_GAP_NS
@@ -29,8 +28,6 @@ class Association:
 
     bundles: int = 0
     without_odometry: int = 0
-    odometry_out_of_order: int = 0
-    odometry_not_finite: int = 0
     alone: Counter[str] = field(default_factory=Counter)
     unpaired: Counter[str] = field(default_factory=Counter)
 
@@ -40,22 +37,21 @@ def associate(
     primary: Channel[Message],
     counts: Association,
     *,
-    with_odometry: bool = True,
+    odometry: OdometryTrack | None = None,
     held: Collection[Channel[Message]] = (),
     beside: Collection[Channel[Message]] = (),
     by_frame: Mapping[Channel[Message], int] = _NONE,
 ) -> Iterator[Bundle]:
-    """One bundle per message of the channel `primary`, with odometry interpolated at its stamp if that is wanted.
+    """One bundle per message of the channel `primary`, with `odometry` at its stamp if there is any.
 
-    `messages` are (channel, log time, message) by log time; every `Odometry` among them is taken as the robot's.
-    Stamps are the headers', log time where those are zero. Of a `held` channel a bundle gets the latest message that
-    came at most `BESIDE_NS` after it, else the first; of transforms the latest of every frame so far. Of a channel
-    `beside` it gets the message nearest to its stamp, within `BESIDE_NS`, among those that are nearer to no other
-    bundle. Of the channels `by_frame` it gets one such message of each frame; there will be as many frames as the
-    number says, or more. A bundle waits for what is still to come, at most `WINDOW_NS` of log time; then it goes
-    without. `counts` is kept up to date.
+    `messages` are (channel, log time, message) by log time. Stamps are the headers', log time where those are zero. Of
+    a `held` channel a bundle gets the latest message that came at most `BESIDE_NS` after it, else the first; of
+    transforms the latest of every frame so far. Of a channel `beside` it gets the message nearest to its stamp, within
+    `BESIDE_NS`, among those that are nearer to no other bundle. Of the channels `by_frame` it gets one such message of
+    each frame; there will be as many frames as the number says, or more. A bundle waits for what is still to come, at
+    most `WINDOW_NS` of log time; then it goes without. `counts` is kept up to date.
     """
-    table = _Table(primary, counts, with_odometry, (held, beside), by_frame)
+    table = _Table(primary, counts, odometry, (held, beside), by_frame)
     for channel, log_time_ns, message in messages:
         table.take(channel, log_time_ns, message)
         yield from table.ready(log_time_ns)
@@ -69,12 +65,12 @@ class _Table:
         self,
         primary: Channel[Message],
         counts: Association,
-        with_odometry: bool,
+        odometry: OdometryTrack | None,
         others: tuple[Collection[Channel[Message]], Collection[Channel[Message]]],
         by_frame: Mapping[Channel[Message], int],
     ) -> None:
         self._primary, self._counts, self._by_frame = primary, counts, by_frame
-        self._odometry = OdometryBuffer() if with_odometry else None
+        self._odometry = odometry
         self._held: dict[Channel[Message], dict[str, _Held]] = {channel: {} for channel in others[0]}
         self._beside: dict[Channel[Message], dict[str, _Beside]] = {channel: {} for channel in others[1]}
         self._waiting: deque[Bundle] = deque()
@@ -90,10 +86,6 @@ class _Table:
         elif channel in self._beside:
             partners = self._beside[channel].setdefault(self._frame(channel, message), _Beside())
             partners.messages.append((stamp_ns, message))
-        elif self._odometry is not None and isinstance(message, Odometry):
-            self._odometry.add(stamp_ns, message)
-            self._counts.odometry_out_of_order = self._odometry.out_of_order
-            self._counts.odometry_not_finite = self._odometry.not_finite
 
     def _frame(self, channel: Channel[Message], message: Message) -> str:
         """The frame of a message whose channel has one for each, else none."""
@@ -113,8 +105,6 @@ class _Table:
 
     def _is_complete(self, bundle: Bundle) -> bool:
         stamp_ns = bundle.stamp_ns
-        if self._odometry is not None and self._odometry.latest_ns < stamp_ns + self._duration_ns(bundle):
-            return False
         frames_of = {channel: sum(map(bool, frames.values())) for channel, frames in self._held.items()}
         frames_of |= {channel: len(frames) for channel, frames in self._beside.items()}
         if any(count < self._by_frame.get(channel, 1) for channel, count in frames_of.items()):

@@ -53,7 +53,9 @@ def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
     seen = [_observe(plan, log, reason, parts, watch) for log in plan.logs]
     logs = [mapped for mapped, _ in seen]
     with watch("solve", None, "steps"):
-        landmark_map, trajectories, termination = _solve(plan, logs, [observations for _, observations in seen])
+        built = _solve(plan, logs, [observations for _, observations in seen])
+    landmark_map, trajectories, termination, left_out = built
+    logs = [_told(log, count) for log, count in zip(logs, left_out or (0,) * len(logs), strict=True)]
     for log, trajectory in zip(plan.logs, trajectories, strict=True):
         if log.request.recording in plan.task.outputs:
             write_part(plan, log, landmark_map, trajectory, parts)
@@ -63,6 +65,17 @@ def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
     manifest = Manifest("map", inputs=fingerprints, options=run.options(), stages=(plan.record,))
     write_map(plan.task.database, landmark_map, manifest.entries())
     return run
+
+
+def _told(log: MappedLog, left_out: int) -> MappedLog:
+    """A log with the number of its bundles that the map had to leave out."""
+    if not left_out:
+        return log
+    dropped = {
+        **log.outcome.dropped,
+        "bundles of pieces of odometry that share too few landmarks with the map": left_out,
+    }
+    return replace(log, outcome=replace(log.outcome, dropped=dropped))
 
 
 def _observe(plan: MapPlan, log: LogPlan, reason: str, parts: Path, watch: Watch) -> tuple[MappedLog, LogObservations]:
@@ -81,7 +94,7 @@ def _collect(plan: MapPlan, log: LogPlan, session: Session, watch: Watch) -> tup
     Raises:
         RecordingError: it has no scene objects or no odometry, or none of its bundles has odometry.
     """
-    source = StageInput(STAGE, session.log_for(log.record), session.request.span)
+    source = StageInput(STAGE, session.log_for(log.record), session.request.span, session.examiner)
     with watch(f"read {source.path.name}", source.count, "bundles") as progress:
         observations: LogObservations = STAGE.collect(source.bundles(progress), plan.config)
     source.close()
@@ -91,7 +104,7 @@ def _collect(plan: MapPlan, log: LogPlan, session: Session, watch: Watch) -> tup
             f"{source.path}: none of {observations.bundles} bundles has odometry within 2 s; check that the clocks of "
             "odometry and scene objects agree"
         )
-    return replace(observations, fingerprint=log.fingerprint), outcome_of(source.reading)
+    return replace(observations, fingerprint=log.fingerprint), outcome_of(source.reading, notes=source.notes)
 
 
 def _solve(plan: MapPlan, logs: Sequence[MappedLog], observations: Sequence[LogObservations]) -> BuiltMap:

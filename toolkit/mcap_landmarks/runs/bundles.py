@@ -3,24 +3,26 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from itertools import chain
+
+import numpy as np
 
 from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, ODOMETRY, TF_STATIC
 from mcap_landmarks.errors import MessageError, RecordingError
+from mcap_landmarks.geometry.frames import is_rigid
+from mcap_landmarks.inspection.examination import Examined
+from mcap_landmarks.inspection.odometry_examination import STRAY
 from mcap_landmarks.inspection.topic_roles import ROLES, Choice, choose, could_be, message_type
 from mcap_landmarks.maps.scene_objects import usable
-from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.points import PointCloud2
-from mcap_landmarks.messages.poses import Odometry, PoseStamped
 from mcap_landmarks.messages.scan import LaserScan
-from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.spatial_objects import SpatialObjects
 from mcap_landmarks.messages.transforms import TFMessage
-from mcap_landmarks.messages.velocities import SceneVelocities
-from mcap_landmarks.recording.odometry_buffer import odometry_from
+from mcap_landmarks.recording.odometry_track import OdometryTrack
 from mcap_landmarks.recording.time_association import Association, associate
 from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage, Readable
 
@@ -32,11 +34,8 @@ _OF_CAMERAS = (CAMERA_INFO, DETECTIONS)
 
 Frames = Mapping[Connection, str]
 """The frames of several cameras, by the connections of their images and CameraInfos."""
-Offsets = Mapping[Connection, int]
-"""Nanoseconds to add to the stamps of connections whose clock is another one."""
-_Sensed = Odometry | PoseStamped | LaserScan | PointCloud2 | ScanObjects | ClusteredCloud | Detections | SceneObjects
-_Timed = _Sensed | SceneVelocities
-"""Messages whose stamps offsets correct: those of `OFFSET_ROLES`."""
+_Timed = LaserScan | PointCloud2 | Detections | SceneObjects
+"""Messages that meet others by their stamps."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +58,10 @@ class Reading:
     topics: dict[str, str] = field(default_factory=dict)
     """The log's own topic for a channel's."""
 
+    def name(self, inputs: Mapping[Connection, Channel[Message]]) -> None:
+        """Note the log's own topics."""
+        self.topics.update({channel.topic: connection.topic for connection, channel in inputs.items()})
+
     def lose(self, topic: str, log_time_ns: int, reason: str) -> None:
         """Count a message that cannot be read; the first of a topic is told in full."""
         self.unreadable[topic] += 1
@@ -79,8 +82,6 @@ class Reading:
         association = self.association
         found = Counter(self.dropped)
         found["bundles without odometry at their time"] += association.without_odometry
-        found["odometry messages whose time goes backwards"] += association.odometry_out_of_order
-        found["odometry messages with numbers that are not finite"] += association.odometry_not_finite
         for topic, count in association.alone.items():
             found[f"bundles without {self.topics.get(topic, topic)} at their time"] += count
         for topic, count in association.unpaired.items():
@@ -126,33 +127,56 @@ def _missing(recording: Readable, channel: Channel[Message], empty: bool) -> str
     return f"{recording.path}: there is no {role.name} ({types}); {could_be(present, channel) or remedy}"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Correction:
+    """What is done to messages before they are associated.
+
+    `examined` tells clocks, frames and odometry; `frames` are those of several cameras: drivers often give images
+    another one than their CameraInfo.
+    """
+
+    examined: Examined | None = None
+    frames: Frames = field(default_factory=dict)
+
+    @property
+    def track(self) -> OdometryTrack:
+        """The odometry, empty where there is none."""
+        odometry = self.examined.odometry if self.examined else None
+        return (odometry.track if odometry else None) or OdometryTrack.empty()
+
+    def moment(self, raw: RawMessage, stamp_ns: int) -> int | None:
+        """The stamp that counts, None where a message's is stray."""
+        clock = self.examined.clocks.get(raw.connection) if self.examined else None
+        return stamp_ns if clock is None or clock.is_plain(stamp_ns) else clock.moment(raw.log_time_ns, stamp_ns)
+
+
 def read_bundles(
     raws: Iterable[RawMessage],
     inputs: Mapping[Connection, Channel[Message]],
     reads: Sequence[Channel[Message]],
     reading: Reading,
-    frames: Frames = MappingProxyType({}),
-    offsets_ns: Offsets = MappingProxyType({}),
+    correction: Correction,
+    seeds: Iterable[tuple[Channel[Message], int, Message]] = (),
 ) -> Iterator[Bundle]:
     """The bundles of messages by log time, one per message of the first channel of `reads`.
 
-    They wait for odometry if `reads` has it, for transforms and camera information if the recording has any, and get
-    of every other channel of `reads` the message nearest in time, of detections that of every camera. `reading` is kept
-    up to date; `frames` are those of several cameras, `offsets_ns` those of clocks, see `decoded`.
+    They get odometry if `reads` has it, wait for transforms and camera information if the recording has any, and get
+    of every other channel of `reads` the message nearest in time, of detections that of every camera. `seeds` hold from
+    the start on, until others of their kind come. `reading` is kept up to date.
 
     A message that cannot be decoded is a loss, an unusable object is dropped; both are counted.
     """
-    reading.topics.update({channel.topic: connection.topic for connection, channel in inputs.items()})
+    reading.name(inputs)
     present = {*inputs.values()} | {TF_STATIC for entry in inputs if entry.message_type == TFMessage.ROS_TYPE}
     others = [channel for channel in reads[1:] if channel != ODOMETRY and channel in present]
     return associate(
-        decoded(raws, inputs, reading, frames, offsets_ns),
+        chain(seeds, decoded(raws, inputs, reading, correction)),
         reads[0],
         reading.association,
-        with_odometry=ODOMETRY in reads,
+        odometry=correction.track if ODOMETRY in reads else None,
         held=[channel for channel in others if channel in HELD],
         beside=[channel for channel in others if channel not in HELD],
-        by_frame={channel: _frame_count(channel, inputs, frames) for channel in _OF_CAMERAS},
+        by_frame={channel: _frame_count(channel, inputs, correction.frames) for channel in _OF_CAMERAS},
     )
 
 
@@ -174,39 +198,61 @@ def decoded(
     raws: Iterable[RawMessage],
     inputs: Mapping[Connection, Channel[Message]],
     reading: Reading,
-    frames: Frames = MappingProxyType({}),
-    offsets_ns: Offsets = MappingProxyType({}),
+    correction: Correction = Correction(),
 ) -> Iterator[tuple[Channel[Message], int, Message]]:
-    """The messages of inputs with their channels and log times; odometry also as such, whatever message carries it.
+    """The messages of inputs with their channels and log times, corrected; transforms also where they are odometry.
 
-    Messages of connections in `frames` get that frame: drivers often give images another one than their CameraInfo.
-    `offsets_ns` are added to stamps, of transforms only where they are odometry.
+    Raises:
+        RecordingError: scene objects are in a frame that no transforms lead from to the robot's.
     """
     for raw in raws:
         channel = inputs.get(raw.connection)
-        if channel is None:
-            continue
+        if channel is None or (channel == ODOMETRY and raw.connection.message_type != TFMessage.ROS_TYPE):
+            continue  # odometry was examined as a whole
         try:
             message: Message = decode(message_type(channel, raw.connection), raw.data)
         except MessageError as error:
             reading.lose(raw.connection.topic, raw.log_time_ns, str(error))
             continue
-        if raw.connection in frames and isinstance(message, CameraInfo | CompressedImage | Image):
-            message = replace(message, frame_id=frames[raw.connection])
-        if isinstance(message, SceneObjects):
-            message = usable(message, reading.dropped)
-        offset_ns = offsets_ns.get(raw.connection, 0)
-        odometry = odometry_from(message) if channel == ODOMETRY else None
         if isinstance(message, TFMessage):  # one message may hold odometry and where a sensor is
-            yield TF_STATIC, raw.log_time_ns, message
-        else:
-            yield channel, raw.log_time_ns, _later(message, raw.log_time_ns, offset_ns)
-        if odometry is not None and odometry is not message:
-            yield ODOMETRY, raw.log_time_ns, _later(odometry, raw.log_time_ns, offset_ns)
+            yield TF_STATIC, raw.log_time_ns, _rigid(message, reading.dropped)
+            continue
+        corrected = _corrected(message, raw, correction, reading)
+        if corrected is not None:
+            yield channel, raw.log_time_ns, corrected
 
 
-def _later(message: Message, log_time_ns: int, offset_ns: int) -> Message:
-    """A message with an offset added to its stamp; to the log time where the stamp is zero."""
-    if not offset_ns or not isinstance(message, _Timed):
+def _corrected(message: Message, raw: RawMessage, correction: Correction, reading: Reading) -> Message | None:
+    """A message with the stamp and in the frame that count, None where its stamp is stray."""
+    if raw.connection in correction.frames and isinstance(message, CameraInfo | CompressedImage | Image):
+        message = replace(message, frame_id=correction.frames[raw.connection])
+    if isinstance(message, _Timed):
+        moment_ns = correction.moment(raw, message.stamp_ns)
+        if moment_ns is None:
+            reading.dropped[f"messages of {raw.connection.topic} {STRAY}"] += 1
+            return None
+        message = message if moment_ns == message.stamp_ns else replace(message, stamp_ns=moment_ns)
+    if isinstance(message, SceneObjects):
+        message = usable(_in_base(message, raw, correction.examined), reading.dropped)
+    return message
+
+
+def _in_base(scene: SceneObjects, raw: RawMessage, examined: Examined | None) -> SceneObjects:
+    """Scene objects of anyone in the robot's own frame, where those of results are."""
+    if examined is None or raw.connection not in examined.clocks:
+        return scene
+    base_from_frame = examined.frames.base_from(examined.base, scene.frame_id, f"objects on {raw.connection.topic} are")
+    if np.array_equal(base_from_frame, np.eye(4)):
+        return scene
+    return decode(SpatialObjects, raw.data).seen_from_above(scene, examined.base, base_from_frame)
+
+
+def _rigid(message: TFMessage, dropped: Counter[str]) -> TFMessage:
+    """Transforms without those that are none."""
+    good = tuple(step for step in message.transforms if is_rigid(step.translation_m, step.rotation_xyzw))
+    if len(good) == len(message.transforms):
         return message
-    return replace(message, stamp_ns=(message.stamp_ns or log_time_ns) + offset_ns)
+    dropped["transforms with a quaternion of zeros or numbers that are not finite"] += len(message.transforms) - len(
+        good
+    )
+    return TFMessage(good)

@@ -63,7 +63,7 @@ def _localized(session: Session, before: list[str], time_ns: int, watch: Watch) 
     *steps, last = plan(session.request, session.log, [*before, _LOCALIZE])
     for step in steps:
         session.work(step, watch)
-    log = StageInput(last.stage, session.log_for(last.record), session.request.span)
+    log = StageInput(last.stage, session.log_for(last.record), session.request.span, session.examiner)
     nearest: Answer | None = None
     with contextlib.closing(_results(last, log, watch)) as results:
         for answer in _answers(results):

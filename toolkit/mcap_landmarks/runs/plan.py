@@ -147,6 +147,11 @@ def choice_options(choice: Choice, reads: Sequence[Channel[Message]]) -> dict[st
     given = {entry.name: getattr(choice, entry.name) for entry in fields(choice)}
     given["topics"] = {role: topic for role, topic in choice.topics.items() if role in roles}
     given["images"] = list(choice.images) if roles & {"image", "camera_info"} else []
-    clocks = {role for channel, role in OFFSET_ROLES.items() if channel in reads}
-    given["offsets_ns"] = {role: ns for role, ns in sorted(choice.offsets_ns.items()) if role in clocks and ns}
+    given["offsets_ns"] = _offsets(choice, reads)
     return {name: value for name, value in given.items() if value}
+
+
+def _offsets(choice: Choice, reads: Sequence[Channel[Message]]) -> dict[str, int]:
+    """What is added to the stamps of channels that are read, by role."""
+    clocks = {OFFSET_ROLES[channel] for channel in reads if channel in OFFSET_ROLES}
+    return {role: ns for role, ns in sorted(choice.offsets_ns.items()) if ns and role in clocks}

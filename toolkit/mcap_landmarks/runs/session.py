@@ -9,8 +9,10 @@ from pathlib import Path
 
 from mcap_landmarks.channels import SHARED
 from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.inspection.examination import Examiner
 from mcap_landmarks.inspection.topic_roles import chosen_before
 from mcap_landmarks.manifest import Outcome, StageRecord
+from mcap_landmarks.mounting import read_extrinsics
 from mcap_landmarks.progress import Watch
 from mcap_landmarks.recording.layered_log import Layer, LayeredLog, result_layers
 from mcap_landmarks.recording.reader import Recording, open_recording
@@ -94,6 +96,9 @@ class Session:
         self.request, self.log = request, log
         self.results = dict(log.results)
         self.of_this_run: set[str] = set()
+        extrinsics = request.files.get("extrinsics")
+        own = read_extrinsics(extrinsics) if extrinsics is not None else ()
+        self.examiner = Examiner(request.span.start_ns, request.span.end_ns, own)
         self._stack, self._parts = stack, parts
         self.earlier: Recording | None = None
         self._stores: list[tuple[str, dict[str, Layer]]] = [("the log", log.results)]
@@ -116,7 +121,7 @@ class Session:
         name, reason = step.stage.name, self._why(step.record)
         self._check_files(step, reason)
         target = part_file(self._parts, step.record)
-        log = StageInput(step.stage, self.log_for(step.record), self.request.span)
+        log = StageInput(step.stage, self.log_for(step.record), self.request.span, self.examiner)
         with watch(f"{name} {self.log.path.name}", log.count, "bundles") as progress:
             record = run_stage(step, log, self.request.thinning, target, progress)
         self._show(result_layers(self._open(target)))

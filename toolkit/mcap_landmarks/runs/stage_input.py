@@ -1,18 +1,22 @@
 """A log as one stage reads it: which connections, and the bundles of their messages in one pass."""
 
+import contextlib
 import copy
 from collections.abc import Iterator
 from itertools import chain
 from typing import Self
 
-from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, DETECTIONS, ODOMETRY
-from mcap_landmarks.errors import UsageError
+from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, DETECTIONS, ODOMETRY, TF_STATIC
+from mcap_landmarks.errors import MessageError, RecordingError, UsageError
 from mcap_landmarks.inspection.cameras import NO_CAMERAS, Cameras, info_frames
-from mcap_landmarks.inspection.topic_roles import OFFSET_ROLES, cameras_of, choose
-from mcap_landmarks.messages.codec import M
+from mcap_landmarks.inspection.examination import Asked, Examined, Examiner
+from mcap_landmarks.inspection.odometry_examination import ExaminedOdometry
+from mcap_landmarks.inspection.topic_roles import OFFSET_ROLES, cameras_of, choose, message_type
+from mcap_landmarks.messages.codec import M, Message, decode
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.layered_log import LayeredLog
-from mcap_landmarks.runs.bundles import Reading, Span, decoded, held_before, inputs_of, read_bundles
+from mcap_landmarks.recording.odometry_track import odometry_from
+from mcap_landmarks.runs.bundles import Correction, Reading, Span, decoded, held_before, inputs_of, read_bundles
 from mcap_landmarks.runs.thinning import Thinning, thin
 from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage, Reduction, Stage
 
@@ -27,7 +31,7 @@ class StageInput:
         UsageError: several topics could be meant, or the one that was chosen is of another type.
     """
 
-    def __init__(self, stage: Stage | Reduction, log: LayeredLog, span: Span) -> None:
+    def __init__(self, stage: Stage | Reduction, log: LayeredLog, span: Span, examiner: Examiner | None = None) -> None:
         self.path, self.channels, self.messages = log.path, log.channels, log.messages
         self.reading = Reading()
         self._log, self._span, self._reads = log, span, stage.reads
@@ -35,8 +39,8 @@ class StageInput:
         self._primaries = [entry for entry, channel in self._inputs.items() if channel == stage.reads[0]]
         self.primary = self._primaries[0]
         cameras = cameras_of(log, span.choice) if {CAMERA_IMAGE, CAMERA_INFO} & {*self._inputs.values()} else NO_CAMERAS
-        self.notes, self._frames = cameras.notes(), self._frames_of(cameras)
-        self._offsets_ns = self._offsets()
+        self._correction = Correction(self._examined(examiner), self._frames_of(cameras))
+        self.notes = (*cameras.notes(), *self._odometry.notes)
 
     @property
     def count(self) -> int:
@@ -45,10 +49,13 @@ class StageInput:
 
     def first(self, channel: Channel[M]) -> M | None:
         """See `InputLog`."""
-        connections = [entry for entry, known in self._inputs.items() if known == channel]
-        raws = self._log.messages(connections)
-        messages = decoded(raws, self._inputs, Reading(), offsets_ns=self._offsets_ns)
-        return next((message for _, _, message in messages if isinstance(message, channel.message)), None)
+        for raw in self._log.messages([entry for entry, known in self._inputs.items() if known == channel]):
+            with contextlib.suppress(MessageError):
+                found = decode(message_type(channel, raw.connection), raw.data)
+                message = odometry_from(found) if channel == ODOMETRY else found
+                if isinstance(message, channel.message):
+                    return message
+        return None
 
     def bundles(self, progress: Progress, thinning: Thinning = _EVERY_MESSAGE) -> Iterator[Bundle]:
         """The bundles, without those that `thinning` leaves out; `progress` is told of each message that makes one.
@@ -56,15 +63,16 @@ class StageInput:
         Raises:
             UsageError: messages are to be left out by motion, and there is no odometry.
         """
+        self.reading.dropped.update(self._odometry.dropped)
         raws = chain(held_before(self._log, self._inputs, self._span.start_ns), self._raws(progress, thinning))
-        return read_bundles(raws, self._inputs, self._reads, self.reading, self._frames, self._offsets_ns)
+        return read_bundles(raws, self._inputs, self._reads, self.reading, self._correction, self._seeds())
 
     def by_frame(self) -> dict[str, Self]:
         """The same log for each of several cameras, whose images are primary there, by frame; none for one camera."""
         found = {}
         for connection in self._primaries:
-            if connection in self._frames:
-                found[self._frames[connection]] = one = copy.copy(self)
+            if connection in self._correction.frames:
+                found[self._correction.frames[connection]] = one = copy.copy(self)
                 one.primary = connection
         return found
 
@@ -79,14 +87,42 @@ class StageInput:
         told = {entry: frames.get(remaps.get(entry.topic, entry.topic)) for entry in self._inputs}
         return {entry: frame for entry, frame in told.items() if frame is not None} or info_frames(self._log, infos)
 
-    def _offsets(self) -> dict[Connection, int]:
-        """What the user adds to stamps. Results were made of corrected ones, but detections have their images'."""
+    def _examined(self, examiner: Examiner | None) -> Examined | None:
+        """What is known of stamps, frames and odometry; nothing where the stage looks at images alone.
+
+        Raises:
+            RecordingError: the odometry cannot be used.
+        """
+        if self.primary in self._inputs and self._inputs[self.primary] == CAMERA_IMAGE:
+            return None
+        examiner = examiner or Examiner(self._span.start_ns, self._span.end_ns)
         made = {entry.connection for layer in self._log.layers if layer.record for entry in layer.channels}
-        return {
+        # Results were made of corrected stamps, but detections have their images'.
+        offsets_ns = {
             connection: self._span.choice.offsets_ns.get(OFFSET_ROLES.get(channel, ""), 0)
             for connection, channel in self._inputs.items()
             if channel == DETECTIONS or connection not in made
         }
+        examined = examiner.examine(self._log, Asked(self._inputs, self.primary, made, offsets_ns))
+        if examined.odometry is not None and examined.odometry.refusal:
+            raise RecordingError(f"{self.path}: {examined.odometry.refusal}")
+        return examined
+
+    @property
+    def _odometry(self) -> ExaminedOdometry:
+        examined = self._correction.examined
+        return (examined.odometry if examined else None) or ExaminedOdometry(None)
+
+    def _seeds(self) -> Iterator[tuple[Channel[Message], int, Message]]:
+        """What holds from the start on although it was logged later: the first transforms, and CameraInfo."""
+        examined, start_ns = self._correction.examined, self._span.start_ns or 0
+        if examined is not None and examined.frames.first is not None:
+            yield TF_STATIC, start_ns, examined.frames.first
+        for connection, channel in self._inputs.items():
+            raw = next(iter(self._log.messages([connection])), None) if channel == CAMERA_INFO else None
+            if raw is not None:
+                first = raw._replace(log_time_ns=start_ns)
+                yield from decoded([first], self._inputs, Reading(), self._correction)
 
     def _raws(self, progress: Progress, thinning: Thinning) -> Iterator[RawMessage]:
         odometry = choose(self._log, ODOMETRY, self._span.choice) if thinning.by_motion else ()

@@ -13,7 +13,7 @@ from mcap_landmarks.errors import MessageError, UsageError
 from mcap_landmarks.geometry.se2 import Array, between
 from mcap_landmarks.inspection.topic_roles import message_type
 from mcap_landmarks.messages.codec import decode
-from mcap_landmarks.recording.odometry_buffer import odometry_from
+from mcap_landmarks.recording.odometry_track import odometry_from
 from mcap_landmarks.stage import Connection, RawMessage
 
 _DISTANCE = re.compile(r"(?P<number>.*)(?P<unit>deg|m)")

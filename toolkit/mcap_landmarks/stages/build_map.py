@@ -22,7 +22,6 @@ def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservation
     """What one log saw: its bundles that have odometry, and their objects, but for those that move."""
     kept, seen, odometry, count = _usable(bundles)
     scenes, dropped = _standing(kept, seen, config)
-    sizes = [len(scene) for scene in scenes]
     spread = [known_covariances(scene, config.range_sigma_m, config.bearing_sigma_rad) for scene in scenes]
     return LogObservations(
         np.array([bundle.stamp_ns for bundle in kept], dtype=np.int64),
@@ -30,13 +29,14 @@ def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservation
         np.array([at.odom_from_base for at in odometry]).reshape(-1, 3),
         np.array([at.way_m for at in odometry]),
         np.array([at.turned_rad for at in odometry]),
-        np.repeat(np.arange(len(kept)), sizes),
+        np.repeat(np.arange(len(kept)), list(map(len, scenes))),
         tuple(name for scene in scenes for name in scene.classes),
         np.concatenate([np.zeros((0, 2)), *(scene.positions_xy for scene in scenes)]),
         np.concatenate([np.zeros((0, 2, 2)), *spread]),
         np.concatenate([np.zeros(0), *(scene.radii_m for scene in scenes)]),
         count,
         dropped=dropped,
+        piece=np.array([at.piece for at in odometry], dtype=np.int64),
     )
 
 

@@ -23,7 +23,7 @@ from mcap_landmarks.lidar import thesis
 from mcap_landmarks.lidar.beams import Beams, together
 from mcap_landmarks.lidar.clustering import cluster, shapes_of
 from mcap_landmarks.lidar.config import ClusterConfig
-from mcap_landmarks.lidar.object_tracks import Tracks
+from mcap_landmarks.lidar.object_tracks import PieceChange, Tracks
 from mcap_landmarks.lidar.objects import Hypotheses
 from mcap_landmarks.lidar.scan_beams import beams_of
 from mcap_landmarks.lidar.whole_clouds import CloudObject, WholeCloud, points_in_base, whole_cloud
@@ -56,10 +56,12 @@ def process(
         yield from _as_in_the_thesis(bundles, mounting)
         return
     shapes = shapes_of(config)
-    tracks = Tracks(config.gate_m, config.memory_s)
+    tracks, anew = Tracks(config.gate_m, config.memory_s), PieceChange()
     # While one cloud is clustered, others are read, turned and written.
     for scan, whole in in_order(_scans(bundles, mounting, config), _points, partial(_clustered, config=config)):
         bundle, base = scan.bundle, scan.base
+        if anew.at(bundle.odometry.piece if bundle.odometry else None):
+            tracks.forget()
         if whole is not None:
             yield from _of_cloud(bundle, base, tracks, whole)
             if not len(whole.clusters):

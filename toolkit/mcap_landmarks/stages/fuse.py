@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from mcap_landmarks.fusion.scene_markers import markers_from_scene
 from mcap_landmarks.fusion.selection import at_least, usable, wanted
 from mcap_landmarks.fusion.thesis import fuse_in_order
 from mcap_landmarks.geometry.frames import plain
+from mcap_landmarks.lidar.object_tracks import PieceChange
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo
@@ -49,12 +50,16 @@ def process(
     """
     motions = ObjectMotions()
     fusers = _Fusers(config, Fuser(config), CloudFuser(config, motions))
+    anew = PieceChange()
     scans, cameras = 0, _Cameras(config, Mounting(resources.get("extrinsics")))
     for bundle in bundles:
         found = bundle.get(SCAN_OBJECTS)
         if found is None:
             continue
         objects, scans = usable(found), scans + 1
+        if anew.at(bundle.odometry.piece if bundle.odometry else None):
+            motions.forget()
+            fusers = replace(fusers, planar=Fuser(config))
         detections, left_out = list[Detections](), Counter[str]()
         for given in bundle.each(DETECTIONS):
             cameras.frames.add(plain(given.frame_id))

@@ -1,0 +1,85 @@
+"""The frames of a whole log: what its transforms and a file of extrinsics connect, and which one is the robot's own."""
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+
+import numpy as np
+
+from mcap_landmarks.channels import TF_STATIC
+from mcap_landmarks.errors import MessageError, RecordingError
+from mcap_landmarks.geometry.frames import REMEDY, FrameTree, is_rigid, plain, rigid
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.mounting import Edge
+from mcap_landmarks.stage import Connection, Readable
+
+_MOST_TRANSFORMS = 300
+"""So many messages of transforms that may change are read: those of mountings come over and over."""
+_ROBOT = re.compile(r"(^|[/_])(base|robot|body|chassis|vehicle|ego|rover|trunk|footprint)([/_]|\d|$)")
+"""What drivers call the robot's own frame, beside REP 105's base_link."""
+
+
+def is_robot(name: str) -> bool:
+    """Whether a frame is by its name that of the robot itself, or has no name."""
+    return not name or _ROBOT.search(plain(name)) is not None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LogFrames:
+    """The frames of a log: `tree` connects them, `first` has the first transform of each.
+
+    `parents` has the frames that transforms give several parents, with these.
+    """
+
+    tree: FrameTree
+    first: TFMessage | None = None
+    parents: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+    def base_from(self, base: str, frame: str, what: str) -> Array:
+        """base_from_frame (4, 4); no difference where the frame is by its name the robot's own, and not connected.
+
+        Raises:
+            RecordingError: nothing leads there; `what` says whose frame it is.
+        """
+        if plain(frame) in ("", plain(base)):
+            return np.eye(4)
+        try:
+            return self.tree.lookup(base, frame)
+        except RecordingError as error:
+            if is_robot(frame) and "optical" not in frame:
+                return np.eye(4)
+            raise RecordingError(
+                f"{what} in the frame {plain(frame)}, and no transforms lead from there to {plain(base)}; {REMEDY}"
+            ) from error
+
+
+def frames_of(log: Readable, own: Sequence[Edge] = ()) -> LogFrames:
+    """The frames of a log, whenever their transforms were logged; `own` are those of a file, which win."""
+    first: dict[str, Transform] = {}
+    parents: dict[str, dict[str, None]] = {}
+    for step in _transforms(log):
+        if not is_rigid(step.translation_m, step.rotation_xyzw):
+            continue  # what needs it says that it is missing
+        first.setdefault(plain(step.child_frame_id), step)
+        parents.setdefault(plain(step.child_frame_id), {})[plain(step.frame_id)] = None
+    edges = [(step.frame_id, name, rigid(step.translation_m, step.rotation_xyzw)) for name, step in first.items()]
+    several = {child: tuple(names) for child, names in parents.items() if len(names) > 1}
+    return LogFrames(FrameTree.of([*edges, *own]), TFMessage(tuple(first.values())) if first else None, several)
+
+
+def _transforms(log: Readable) -> Iterable[Transform]:
+    connections = [entry.connection for entry in log.channels if entry.connection.message_type == TFMessage.ROS_TYPE]
+    for connection in sorted(connections, key=_may_change):
+        raws = log.messages([connection])
+        for raw in islice(raws, _MOST_TRANSFORMS) if _may_change(connection) else raws:
+            try:
+                yield from decode(TFMessage, raw.data).transforms
+            except MessageError:
+                continue
+
+
+def _may_change(connection: Connection) -> bool:
+    return not connection.topic.endswith(TF_STATIC.topic)

@@ -1,0 +1,288 @@
+"""Odometry examined before it is used: what its messages say, and what of that can be believed."""
+
+from array import array
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.estimation.odometry_pieces import NO_PIECE, Pieces, find_pieces
+from mcap_landmarks.geometry.angles import yaw_from_quaternion
+from mcap_landmarks.geometry.frames import plain, planar
+from mcap_landmarks.geometry.se2 import Array, between, compose, exp, inverse
+from mcap_landmarks.inspection.log_frames import is_robot
+from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.recording.clocks import Clock
+from mcap_landmarks.recording.odometry_track import OdometryTrack
+
+_NUMBERS = 22
+"""Of each message: position, quaternion, covariance of x, y and heading, linear and angular velocity."""
+_LOST_M2 = 1e3
+"""Nodes that lost their way say so with variances of 1,000 m^2 and more (RTAB-Map: 9,999)."""
+_ALWAYS = 0.9
+"""What more than this share of all messages says is how the driver fills them, and tells nothing."""
+_MOVED_M, _MOVED_RAD = 0.3, 0.3
+"""A twist that adds up to less is noise of a standing robot."""
+_FASTEST_MPS = 70.0
+"""Odometry that usually is faster is not in metres."""
+_LYING = 0.5
+"""The cosine between up and the z axis of the odometry's frame, below which that frame does not lie flat."""
+_CHOOSE = "choose another topic with --odom TOPIC, or go on without odometry by --odom none"
+
+STRAY = "whose stamp cannot be: it is zero, or far before or after the others'"
+_NOT_FINITE = "odometry messages with numbers that are not finite"
+
+BaseFromFrame = Callable[[str], Array]
+"""The transform (4, 4) from a frame to the base's; raises RecordingError where nothing leads there."""
+
+
+@dataclass(slots=True)
+class OdometryMessages:
+    """What a topic's odometry messages say, gathered one by one."""
+
+    log_ns: "array[int]" = field(default_factory=lambda: array("q"))
+    stamp_ns: "array[int]" = field(default_factory=lambda: array("q"))
+    frames: list[tuple[str, str]] = field(default_factory=list)
+    numbers: "array[float]" = field(default_factory=lambda: array("d"))
+
+    def __len__(self) -> int:
+        return len(self.log_ns)
+
+    def take(self, log_time_ns: int, message: Odometry) -> None:
+        """One more message, by log time."""
+        self.log_ns.append(log_time_ns)
+        self.stamp_ns.append(message.stamp_ns)
+        self.frames.append((plain(message.frame_id), plain(message.child_frame_id)))
+        for values in (
+            message.position_m,
+            message.orientation_xyzw,
+            message.planar_covariance.ravel(),
+            message.linear_mps,
+            message.angular_radps,
+        ):
+            self.numbers.extend(values.tolist())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExaminedOdometry:
+    """Odometry that can be used, None where it cannot and `refusal` says why and what to do.
+
+    `dropped` counts the messages that were left out, by reason; `notes` say what was made of the others.
+    """
+
+    track: OdometryTrack | None
+    refusal: str = ""
+    dropped: Counter[str] = field(default_factory=Counter)
+    notes: tuple[str, ...] = ()
+
+
+def examine(topic: str, messages: OdometryMessages, clock: Clock, base_from: BaseFromFrame) -> ExaminedOdometry:
+    """What of a topic's messages can be used as the odometry of the base.
+
+    Left out are messages with stray stamps, or times that go back, numbers that are not finite, no orientation, or a
+    covariance that says that the robot is lost. Where all poses stay the same or have no orientation the twists are
+    added up. Poses of another frame than the base's become its own, and are laid flat. What leaps is cut into pieces.
+    """
+    dropped, told = Counter[str](), _Told()
+    try:
+        rows = _own(topic, messages)
+        times_ns, rows = _in_time(messages, rows, clock, dropped)
+        values = np.array(messages.numbers).reshape(-1, _NUMBERS)[rows]
+        usable, by_twist = _usable(topic, values, times_ns, dropped)
+        times_ns, rows, values = times_ns[usable], rows[usable], values[usable]
+        if not len(rows):
+            return ExaminedOdometry(None, dropped=+dropped)
+        frame, child = messages.frames[rows[0]]
+        if by_twist:
+            told.mended.append(f"the poses of {topic} {by_twist}; its velocities are added up instead")
+            poses = _of_base(_added_up(times_ns, values), base_from(child))
+        else:
+            poses = _flat(topic, values, base_from(child), told)
+        track = _track(topic, times_ns, poses, values, dropped, told)
+    except RecordingError as error:
+        return ExaminedOdometry(None, str(error), +dropped)
+    # What was mended is not where the log's own frame has it.
+    named = track if told.mended else replace(track, frame_id=frame)
+    return ExaminedOdometry(named, "", +dropped, (*told.mended, *told.notes))
+
+
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """What is to be said: that poses are not those of the messages any more, and what else."""
+
+    mended: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def _own(topic: str, messages: OdometryMessages) -> NDArray[np.int64]:
+    """The rows of the messages that are of the robot, where a few or many are of another frame.
+
+    Raises:
+        RecordingError: several frames could be the robot's.
+    """
+    counts = Counter(child for _, child in messages.frames)
+    known = [child for child, count in counts.items() if count >= (1 - _ALWAYS) / 2 * len(messages)]
+    bases = [child for child in known if is_robot(child)]
+    if len(known) > 1 and len(bases) != 1:
+        names = ", ".join(sorted(known))
+        raise RecordingError(f"{topic} has odometry of several frames, {names}: these are several robots; {_CHOOSE}")
+    own = (bases or known)[0]
+    return np.array([i for i, (_, child) in enumerate(messages.frames) if child == own], dtype=np.int64)
+
+
+def _in_time(
+    messages: OdometryMessages, rows: NDArray[np.int64], clock: Clock, dropped: Counter[str]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Times and rows of the messages whose stamps can be, and rise."""
+    times, kept, latest_ns = list[int](), list[int](), -(2**63)
+    dropped["odometry messages of another frame than the others"] += len(messages) - len(rows)
+    for row in rows.tolist():
+        log_ns = messages.log_ns[row]
+        moment_ns = clock.moment(log_ns, messages.stamp_ns[row])
+        if moment_ns is None:
+            dropped[f"odometry messages {STRAY}"] += 1
+            continue
+        if moment_ns <= latest_ns:
+            dropped["odometry messages whose time goes backwards"] += 1
+            continue
+        times.append(latest_ns := moment_ns)
+        kept.append(row)
+    return np.array(times, dtype=np.int64), np.array(kept, dtype=np.int64)
+
+
+def _usable(
+    topic: str, values: Array, times_ns: NDArray[np.int64], dropped: Counter[str]
+) -> tuple[NDArray[np.bool_], str]:
+    """Which messages (N,) can be used; and if it is their twists that can, what is wrong with their poses.
+
+    Raises:
+        RecordingError: poses have no orientation, and there are no velocities.
+    """
+    finite, turned = np.isfinite(values[:, :7]).all(axis=1), np.abs(np.nan_to_num(values[:, 3:7])).sum(axis=1) > 0
+    posed, driven = finite & turned, np.isfinite(values[:, 16:]).all(axis=1)
+    moves = _moves(times_ns[driven], values[driven])
+    if posed.sum() < len(values) / 2:
+        what = (
+            "have no orientation (their quaternions are zero or NaN)" if np.isfinite(values[:, :3]).any() else "are NaN"
+        )
+        if moves:
+            dropped[_NOT_FINITE] += int((~driven).sum())
+            return np.asarray(driven), what
+        raise RecordingError(
+            f"{topic}: {int((~posed).sum())} of {len(values)} poses {what}, and there are no velocities; {_CHOOSE}"
+        )
+    dropped[_NOT_FINITE] += int((~finite).sum())
+    dropped["odometry messages without orientation (a quaternion of zeros)"] += int((finite & ~turned).sum())
+    if moves and not np.ptp(values[posed, :7], axis=0).any():
+        return np.asarray(posed & driven), "never change"
+    with np.errstate(invalid="ignore"):
+        lost = posed & (values[:, [7, 11]].max(axis=1) >= _LOST_M2)
+    if lost.sum() > _ALWAYS * posed.sum():
+        lost[:] = False
+    dropped["odometry messages that say the robot is lost (variances of 1,000 m^2 and more)"] += int(lost.sum())
+    frozen = _frozen(times_ns, values, posed & driven & ~lost) if moves else np.zeros_like(lost)
+    dropped["odometry messages whose poses stand still while their velocities do not"] += int(frozen.sum())
+    return np.asarray(posed & ~lost & ~frozen), ""
+
+
+def _moves(times_ns: NDArray[np.int64], values: Array) -> bool:
+    """Whether twists tell of a robot that moves."""
+    if len(values) < 2:
+        return False
+    way = np.ptp(_added_up(times_ns, values), axis=0)
+    return bool(max(way[0], way[1]) > _MOVED_M or way[2] > _MOVED_RAD)
+
+
+def _frozen(times_ns: NDArray[np.int64], values: Array, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Messages (N,) whose poses are exactly those before, while the twists add up to more than noise."""
+    rows = np.flatnonzero(usable)
+    same = (values[rows[1:], :7] == values[rows[:-1], :7]).all(axis=1)
+    seconds = np.diff(times_ns[rows]) / 1e9
+    way = np.abs(values[rows[1:]][:, [16, 17, 21]]) * seconds[:, None] * same[:, None]
+    stretch = np.concatenate([[0], np.cumsum(~same)])  # of each row, the number of its run of equal poses
+    sums = np.zeros((stretch[-1] + 1, 3))
+    np.add.at(sums, stretch[1:], way)
+    moved = (np.hypot(sums[:, 0], sums[:, 1]) > _MOVED_M) | (sums[:, 2] > _MOVED_RAD)
+    found = np.zeros(len(values), dtype=np.bool_)
+    found[rows] = moved[stretch]
+    return found
+
+
+def _added_up(times_ns: NDArray[np.int64], values: Array) -> Array:
+    """Poses (N, 3) from the twists of messages, each step by the mean of those at its ends."""
+    twists = values[:, [16, 17, 21]]
+    steps = exp((twists[1:] + twists[:-1]) / 2 * (np.diff(times_ns) / 1e9)[:, None])
+    poses = np.zeros((len(twists), 3))
+    for i, step in enumerate(steps):
+        poses[i + 1] = compose(poses[i], step)
+    return poses
+
+
+def _of_base(odom_from_child: Array, base_from_child: Array) -> Array:
+    """Poses (N, 3) of the base from those of a frame on it, in the plane; they begin at zero."""
+    child_from_base = inverse(planar(base_from_child))
+    return between(compose(odom_from_child[0], child_from_base), compose(odom_from_child, child_from_base))
+
+
+def _flat(topic: str, values: Array, base_from_child: Array, told: _Told) -> Array:
+    """Poses (N, 3) of the base, seen along what is up for it on the mean."""
+    odom_from_child = Rotation.from_quat(values[:, 3:7])
+    odom_from_base = odom_from_child * Rotation.from_matrix(base_from_child[:3, :3].T)
+    up = odom_from_base.apply([0.0, 0.0, 1.0]).mean(axis=0)
+    if np.array_equal(base_from_child, np.eye(4)) and up[2] > _LYING:
+        return np.column_stack([values[:, :2], yaw_from_quaternion(values[:, 3:7])])
+    places = values[:, :3] + odom_from_base.apply(-base_from_child[:3, 3])
+    if up[2] <= _LYING:
+        upright, _ = Rotation.align_vectors([[0.0, 0.0, 1.0]], [up])
+        places, odom_from_base = upright.apply(places), upright * odom_from_base
+        told.mended.append(
+            f"the frame of {topic} does not lie flat; what is up for the robot on the mean is taken for up"
+        )
+    return np.column_stack([places[:, :2], yaw_from_quaternion(odom_from_base.as_quat())])
+
+
+def _track(
+    topic: str,
+    times_ns: NDArray[np.int64],
+    poses: Array,
+    values: Array,
+    dropped: Counter[str],
+    told: _Told,
+) -> OdometryTrack:
+    """The track of poses (N, 3).
+
+    Raises:
+        RecordingError: they are not in metres, or of several robots.
+    """
+    times_s = (times_ns - times_ns[0]) / 1e9
+    found = find_pieces(times_s, poses)
+    if found.places:
+        places = " and at ".join(f"({x:.1f}, {y:.1f}) m" for x, y in found.places[:2])
+        raise RecordingError(f"{topic}: several robots publish odometry on it, at {places}, by turns; {_CHOOSE}")
+    if (speed := _speed(times_s, found)) > _FASTEST_MPS:
+        raise RecordingError(f"{topic}: odometry mostly moves at {speed:.0f} m/s, as if it were in mm; {_CHOOSE}")
+    dropped.update(found.dropped)
+    if found.bridged:
+        leaps = "leap of odometry is" if found.bridged == 1 else "leaps of odometry are"
+        told.mended.append(
+            f"{found.bridged} {leaps} taken out of {topic}: the robot is taken to have driven on as before"
+        )
+    if (count := int(found.piece.max(initial=0)) + 1) > 1:
+        told.notes.append(
+            f"odometry on {topic} leaps or was reset: it is cut into {count} pieces that nothing but landmarks joins"
+        )
+    kept = found.piece != NO_PIECE
+    covariances = np.zeros((int(kept.sum()), 3, 3))
+    covariances[:] = values[kept, 7:16].reshape(-1, 3, 3)
+    return OdometryTrack("", times_ns[kept], found.poses[kept], covariances, found.piece[kept], found.slack[kept])
+
+
+def _speed(times_s: Array, found: Pieces) -> float:
+    """The median speed in m/s."""
+    kept = np.flatnonzero(found.piece != NO_PIECE)
+    steps = np.hypot(*np.diff(found.poses[kept, :2], axis=0).T) / np.maximum(np.diff(times_s[kept]), 1e-6)
+    return float(np.median(steps)) if len(steps) else 0.0
