@@ -65,6 +65,7 @@ def test_channels_roles_and_verbs(tmp_path: Path, capsys: pytest.CaptureFixture[
         "image": [],
         "camera_info": [],
         "scan": [],
+        "point_cloud": [],
         "odometry": ["/odom"],
         "scene_objects": ["/landmarks/scene_objects"],
         "truth": ["/ground_truth/pose"],
@@ -150,8 +151,9 @@ def test_the_network_for_the_images_is_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
 ) -> None:
     log, demo = raw_log(tmp_path / "log.mcap"), resource("recordings", "demo_localize.mcap")
-    found = document(capsys, log, "--check")
+    found = document(capsys, log, "--check", code=PARTIAL)
     (finding,) = found["findings"]
+    assert (found["verbs"], found["blocked"]["map"]) == (["cluster"], ["network"])
     assert (finding["level"], finding["check"], found["network"]) == ("problem", "network", None)
     assert "the bundled network knows rendered objects only" in finding["text"]
     assert finding["remedy"].startswith("get a real network once with `mcap-landmarks models get nanodet`, or give one")
@@ -177,14 +179,17 @@ def test_a_good_log_has_no_findings(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_findings_are_told_with_what_to_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     content = [stamped for stamped in raw_messages() if stamped.channel not in {TF_STATIC, ODOMETRY}]
     log = write(tmp_path / "log.mcap", content)
-    findings = document(capsys, log, "--check")["findings"]
+    found = document(capsys, log, "--check", code=PARTIAL)
+    findings = found["findings"]
+    assert (found["verbs"], found["blocked"]["localize"]) == (["detect"], ["/scan", "/camera/camera_info"])
     assert [(finding["level"], finding["check"]) for finding in findings] == [
         ("problem", "frames"),
         ("problem", "frames"),
         ("warning", "frames"),
     ]
-    assert run(log, "--check") == DONE
+    assert run(log, "--check") == PARTIAL
     said = capsys.readouterr().out
+    assert "localize fails, as said below of /scan, /camera/camera_info" in said
     assert "problem: /scan: there are no transforms: nothing says where the LiDAR (base_scan) sits" in said
     assert "problem: /camera/camera_info: no transforms lead from camera to base_scan; record /tf_static" in said
     assert "warning: there is no odometry" in said

@@ -88,7 +88,11 @@ PLANTED: dict[str, tuple[Change, set[tuple[str, str, str]]]] = {
     "no stamps": (of(SCAN, stamped_by(lambda _: 0)), {("stamps", "/scan", "40 of 40 stamps are zero")}),
     "stamps that go back": (
         of(ODOMETRY, stamped_by(lambda now: now - SECOND * (now == 10 * STEP_NS))),
-        {("stamps", "/odom", "go back 1 times")},
+        {("stamps", "/odom", "1 of 40 messages have a stamp that cannot be")},
+    ),
+    "a clock that is set back": (
+        of(ODOMETRY, stamped_by(lambda now: now - SECOND * (now >= 10 * STEP_NS))),
+        {("stamps", "/odom", "set back once, first by 1.0 s")},
     ),
     "a clock that is late": (
         of(CAMERA_IMAGE, stamped_by(lambda now: now - 300_000_000)),

@@ -20,7 +20,11 @@ def command(
         list[Location], typer.Argument(metavar="PATH...", parser=location, help="Recordings (MCAP), bags or data sets.")
     ],
     check: Annotated[
-        bool, typer.Option("--check", help="Read everything, and tell what will go wrong and what to do about it.")
+        bool,
+        typer.Option(
+            "--check",
+            help="Read everything, and tell what will go wrong and what to do; exit code 3 where something will.",
+        ),
     ] = False,
     json: options.Json = False,
 ) -> None:
@@ -33,10 +37,10 @@ def command(
         say_json("info", documents[0] if len(documents) == 1 else {"logs": documents})
     else:
         _print(logs)
-    losses = [loss for log in logs for loss in log.losses]
-    for loss in losses:
-        warn(f"warning: {loss}")
-    if losses:
+    for log in logs:
+        for loss in log.losses:
+            warn(f"warning: {loss}")
+    if any(log.losses or log.problems for log in logs):
         raise typer.Exit(PARTIAL)
 
 
@@ -60,6 +64,7 @@ def _document(log: "LogInfo") -> dict[str, object]:
         "roles": log.roles,
         "verbs": list(log.verbs),
         "missing": log.missing,
+        "blocked": {verb: list(topics) for verb, topics in log.blocked.items()},
         "losses": list(log.losses),
         **({} if log.findings is None else {"findings": [dataclasses.asdict(finding) for finding in log.findings]}),
         **({} if log.findings is None else {"network": log.network}),
@@ -100,7 +105,9 @@ def _print_channels(log: "LogInfo") -> None:
 
 def _print_verbs(log: "LogInfo") -> None:
     if log.verbs:
-        say(f"ready for: {', '.join(log.verbs)}")
+        say(f"ready {'for' if log.is_recording else 'once converted, for'}: {', '.join(log.verbs)}")
+    for verb, topics in log.blocked.items():
+        say(f"{verb} fails, as said below of {', '.join(topics)}")
     for verb, roles in log.missing.items():
         lacks = [f"{role} ({log.hints[role]})" if role in log.hints else role for role in roles]
         say(f"{verb} lacks: {', '.join(lacks)}")

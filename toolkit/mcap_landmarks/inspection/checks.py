@@ -1,7 +1,6 @@
 """What will go wrong with a log, and what to do about it: told before hours are spent."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +8,11 @@ from numpy.typing import NDArray
 from mcap_landmarks.channels import RESULTS
 from mcap_landmarks.geometry.frames import REMEDY
 from mcap_landmarks.inspection.cameras import ALL, info_topic
+from mcap_landmarks.inspection.cloud_checks import check_clouds
+from mcap_landmarks.inspection.finding import Finding
+from mcap_landmarks.inspection.odometry_checks import check_frames, check_odometry, check_stray_stamps
 from mcap_landmarks.inspection.survey import Returns, Sensor, Survey, connected
+from mcap_landmarks.recording.clocks import set_back, strays
 from mcap_landmarks.recording.time_association import BESIDE_NS, WINDOW_NS
 
 LEAST_HZ = {"image": 1.0, "scan": 2.0, "odometry": 5.0}
@@ -36,17 +39,6 @@ _BASES = ("base_footprint", "base_link")
 """What REP 105 and 120 call the robot's own frame."""
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """Something about a topic that costs results: `problem` where a verb fails or gives nothing, else `warning`."""
-
-    level: str
-    check: str
-    topic: str
-    text: str
-    remedy: str
-
-
 def check(found: Survey) -> list[Finding]:
     """Everything that is to be said about a log, problems first."""
     checks: tuple[Callable[[Survey], Iterator[Finding]], ...] = (
@@ -54,12 +46,16 @@ def check(found: Survey) -> list[Finding]:
         _rates,
         _gaps,
         _stamps,
+        check_stray_stamps,
         _clocks,
         _partners,
         _frames,
+        check_frames,
         _odometry,
+        check_odometry,
         _cameras,
         _beams,
+        check_clouds,
     )
     findings = [finding for one in checks for finding in one(found)]
     return sorted(findings, key=lambda finding: finding.level != "problem")
@@ -109,16 +105,12 @@ def _gaps(found: Survey) -> Iterator[Finding]:
 def _stamps(found: Survey) -> Iterator[Finding]:
     for sensor in found.sensors:
         stamp_ns = sensor.times[1]
-        unset, set_ns = int((stamp_ns == 0).sum()), stamp_ns[stamp_ns != 0]
-        if unset:
+        unset = int((stamp_ns == 0).sum())
+        if unset and not strays(*sensor.times).any():
             text = f"{unset} of {len(stamp_ns)} stamps are zero"
             yield Finding(
                 "warning", "stamps", sensor.topic, text, "log times stand in for them; let the driver set them"
             )
-        back = int((np.diff(set_ns) < 0).sum())
-        if back and sensor.role != "camera_info":
-            text = f"stamps go back {back} times"
-            yield Finding("warning", "stamps", sensor.topic, text, "cut the log where its clock was set, with --start")
         delay_ns = _delay_ns(sensor)
         if delay_ns is not None and abs(delay_ns) > _OTHER_EPOCH_NS:
             text = f"stamps are {_span(delay_ns)} log times"
@@ -152,11 +144,13 @@ def _delays(found: Survey) -> dict[str, float]:
 def _delay_ns(sensor: Sensor) -> float | None:
     """How much later than they were whole messages are logged, most often; None where that says nothing of clocks.
 
-    Whether a scan's stamp is that of its first or of its last beam is not told; what explains more counts. Camera
+    What comes after a clock was set back does not count. Whether a scan's stamp is that of its first or of its last beam is not told; what explains more counts. Camera
     information holds until the next comes: it is often latched, or carried over from before a cut.
     """
     log_ns, stamp_ns = sensor.times
-    known = stamp_ns != 0
+    known = (stamp_ns != 0) & ~strays(log_ns, stamp_ns)
+    backs = set_back(log_ns[known], stamp_ns[known])
+    known &= log_ns < (backs[0][0] if backs else np.int64(2**63 - 1))
     if sensor.role == "camera_info" or not known.any():
         return None
     delay_ns = float(np.median(log_ns[known] - stamp_ns[known]))

@@ -15,7 +15,7 @@ from mcap_landmarks.inspection.topic_roles import message_type
 from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.header import frame_in, stamp_in
 from mcap_landmarks.mounting import BASES, Edge, base_in
-from mcap_landmarks.recording.clocks import Clock, Times, clock_of, set_back, strays
+from mcap_landmarks.recording.clocks import Clock, Times, clock_of, shifts_of
 from mcap_landmarks.recording.odometry_track import odometry_from
 from mcap_landmarks.stage import Channel, Connection, RawMessage, Readable
 
@@ -120,15 +120,8 @@ class Examiner:
     def _shifts(self, asked: Asked, odometry: frozenset[Connection]) -> tuple[tuple[int, ...], int | None]:
         """How far the log's clock was set back by and by, from 0 on, and the log time of the first time."""
         if odometry:
-            columns = _columns((self._messages[odometry].log_ns, self._messages[odometry].stamp_ns))
-        elif asked.primary in self._times:
-            columns = _columns(self._times[asked.primary])
-        else:
-            return (0,), None
-        good = ~strays(*columns) & (columns[1] != 0)
-        backs = set_back(columns[0][good], columns[1][good])
-        shifts = np.cumsum([0, *(by_ns for _, by_ns in backs)])
-        return tuple(shifts.tolist()), backs[0][0] if backs else None
+            return shifts_of(*self._messages[odometry].times)
+        return shifts_of(*_columns(self._times[asked.primary])) if asked.primary in self._times else ((0,), None)
 
     def _examined(
         self, asked: Asked, odometry: frozenset[Connection], base: str, shifts: tuple[tuple[int, ...], int | None]
@@ -139,7 +132,7 @@ class Examiner:
         offset_ns = max((asked.offsets_ns.get(entry, 0) for entry in odometry), key=abs)
         key = odometry, base, offset_ns, shifts
         if key not in self._odometry:
-            clock = clock_of(*_columns((messages.log_ns, messages.stamp_ns)), *shifts)
+            clock = clock_of(*messages.times, *shifts)
             frames = self._frames
             assert frames is not None  # noqa: S101 - `examine` finds them first
             self._odometry[key] = examine(

@@ -8,12 +8,15 @@ from pathlib import Path
 from mcap_landmarks.channels import MAP_POSE, MATCH, POSE, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
 from mcap_landmarks.config import Settings
 from mcap_landmarks.errors import ToolkitError
-from mcap_landmarks.inspection.checks import Finding, check
+from mcap_landmarks.inspection.checks import check
+from mcap_landmarks.inspection.finding import Finding
+from mcap_landmarks.inspection.format_checks import check_formats
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog, open_logs
 from mcap_landmarks.inspection.survey import survey
-from mcap_landmarks.inspection.topic_roles import ROLES, could_be, topics_for
+from mcap_landmarks.inspection.topic_roles import ROLES, Role, could_be, topics_for
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import is_generated
+from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.networks.choice import choose_network
 from mcap_landmarks.progress import Watch
 from mcap_landmarks.recording.reader import Recording, open_recording
@@ -34,6 +37,9 @@ NEEDS: Mapping[str, tuple[str, ...]] = {
 }
 """The roles that each verb cannot do without; scene objects can be made where there are `_SOURCES`."""
 
+_CLOUDS = Role("point_cloud", "--scan-from", (PointCloud2,))
+"""Clouds are scans only where the user says so."""
+
 
 @dataclass(frozen=True, slots=True)
 class ChannelInfo:
@@ -50,6 +56,7 @@ class ChannelInfo:
 class LogInfo:
     """One log. `name` tells the logs of one path apart, `roles` are topics by role, `missing` roles by verb.
 
+    `blocked` are the verbs that have all roles and fail all the same, each with the topics of the problems.
     `hints` tells for roles that are missing which topics could play them, and how to choose one. `network` is the one
     that would look at its images, None where it has none or no network fits; it is told with the findings.
     """
@@ -63,10 +70,21 @@ class LogInfo:
     roles: Mapping[str, list[str]]
     verbs: tuple[str, ...]
     missing: Mapping[str, list[str]]
+    blocked: Mapping[str, tuple[str, ...]] = field(default_factory=dict, kw_only=True)
     hints: Mapping[str, str]
     losses: tuple[str, ...] = field(default=())
     findings: tuple[Finding, ...] | None = None
     network: str | None = None
+
+    @property
+    def problems(self) -> list[Finding]:
+        """The findings that make a verb fail or give nothing."""
+        return [finding for finding in self.findings or () if finding.level == "problem"]
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether it is a file that verbs read as it is; bags and data sets are converted first."""
+        return self.path.suffix == ".mcap" and self.path.is_file()
 
 
 def describe(place: Location, settings: Settings, watch: Watch | None = None) -> list[LogInfo]:
@@ -86,11 +104,41 @@ def describe(place: Location, settings: Settings, watch: Watch | None = None) ->
                 losses = [*log.losses, *(loss for part in log.parts for loss in part.losses)]
                 described.append(_describe(log, _profile(log), log.parts, losses))
             if watch is not None:
-                with watch(f"check {log.name}", log.size_bytes) as progress:
-                    found = survey(log, described[-1].roles, progress)
-                network, about_it = _network(log) if found.of("image") else (None, [])
-                described[-1] = replace(described[-1], findings=(*about_it, *check(found)), network=network)
+                described[-1] = _checked(log, described[-1], watch)
         return described
+
+
+def _checked(log: OpenLog, info: LogInfo, watch: Watch) -> LogInfo:
+    """What is known of a log when all of it was read: what is damaged, what will cost results, and which verbs fail."""
+    with watch(f"check {log.name}", log.size_bytes) as progress:
+        found = survey(log, info.roles, progress)
+    network, about_it = _network(log) if found.of("image") else (None, [])
+    formats = [one for part in log.parts if isinstance(part, McapLog) for one in check_formats(part.recorded)]
+    findings = (*formats, *about_it, *check(found))
+    losses = dict.fromkeys([*info.losses, *(loss for part in log.parts for loss in part.losses)])
+    blocked = _blocked(info, findings)
+    verbs = tuple(verb for verb in info.verbs if verb not in blocked)
+    return replace(info, findings=findings, network=network, losses=tuple(losses), verbs=verbs, blocked=blocked)
+
+
+def _blocked(info: LogInfo, findings: Sequence[Finding]) -> dict[str, tuple[str, ...]]:
+    """The verbs that fail because of problems, with what these are about."""
+    role_of = {topic: role for role, topics in info.roles.items() for topic in topics}
+    found: dict[str, dict[str, None]] = {}
+    for finding in (one for one in findings if one.level == "problem"):
+        role = role_of.get(finding.topic, finding.check)
+        for verb in info.verbs:
+            if role in _uses(verb, info.roles):
+                found.setdefault(verb, {})[finding.topic or finding.check] = None
+    return {verb: tuple(topics) for verb, topics in found.items()}
+
+
+def _uses(verb: str, roles: Mapping[str, Sequence[str]]) -> set[str]:
+    """The roles, and kinds of problems, that a verb's results depend on."""
+    if verb not in {"map", "localize"}:
+        return {*NEEDS[verb], *({"network"} if verb == "detect" else ())}
+    made = {"scene_objects"} if roles.get("scene_objects") else {*_SOURCES, "network"}
+    return {*made, "frames", *({"odometry"} if verb == "map" else ())}
 
 
 def _network(log: OpenLog) -> tuple[str | None, list[Finding]]:
@@ -169,5 +217,6 @@ def _roles(present: Collection[tuple[str, str]]) -> dict[str, list[str]]:
     named = {topic for topics in _BY_TOPIC.values() for topic in topics}
     others = [(topic, ros_type) for topic, ros_type in present if topic not in named]
     roles = {role.name: topics_for(role, others) for role in ROLES.values() if role.messages}
+    roles["point_cloud"] = topics_for(_CLOUDS, others)
     topics = {topic for topic, _ in present}
     return roles | {name: [topic for topic in known if topic in topics] for name, known in _BY_TOPIC.items()}

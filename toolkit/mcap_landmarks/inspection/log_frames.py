@@ -58,9 +58,14 @@ class LogFrames:
 
 def frames_of(log: Readable, own: Sequence[Edge] = ()) -> LogFrames:
     """The frames of a log, whenever their transforms were logged; `own` are those of a file, which win."""
+    return frames_from(_transforms(log), own)
+
+
+def frames_from(steps: Iterable[Transform], own: Sequence[Edge] = ()) -> LogFrames:
+    """The frames that transforms connect, by the first one of each; `own` win."""
     first: dict[str, Transform] = {}
     parents: dict[str, dict[str, None]] = {}
-    for step in _transforms(log):
+    for step in steps:
         if not is_rigid(step.translation_m, step.rotation_xyzw):
             continue  # what needs it says that it is missing
         first.setdefault(plain(step.child_frame_id), step)

@@ -16,7 +16,7 @@ from mcap_landmarks.geometry.frames import plain, planar
 from mcap_landmarks.geometry.se2 import Array, between, compose, exp, inverse
 from mcap_landmarks.inspection.log_frames import is_robot
 from mcap_landmarks.messages.poses import Odometry
-from mcap_landmarks.recording.clocks import Clock
+from mcap_landmarks.recording.clocks import Clock, Times
 from mcap_landmarks.recording.odometry_track import OdometryTrack
 
 _NUMBERS = 22
@@ -51,6 +51,11 @@ class OdometryMessages:
 
     def __len__(self) -> int:
         return len(self.log_ns)
+
+    @property
+    def times(self) -> tuple[Times, Times]:
+        """Log times and stamps (N,)."""
+        return np.array(self.log_ns, dtype=np.int64), np.array(self.stamp_ns, dtype=np.int64)
 
     def take(self, log_time_ns: int, message: Odometry) -> None:
         """One more message, by log time."""

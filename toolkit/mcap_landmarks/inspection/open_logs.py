@@ -68,7 +68,8 @@ def open_logs(place: Location, settings: Settings) -> Iterator[Sequence[OpenLog]
 class McapLog:
     """An MCAP file as part of a log. It is opened anew for each reading: a bag may have thousands of them.
 
-    Messages of ROS 1 become CDR; what is neither is left out and counted in `dropped`.
+    Messages of ROS 1 become CDR; what is neither is left out and counted in `dropped`. `recorded` are the channels as
+    they lie in the file.
     """
 
     def __init__(self, file: McapFile) -> None:
@@ -78,6 +79,7 @@ class McapLog:
             self.profile, self.metadata = recording.profile, recording.metadata
             self.start_ns, self.end_ns = recording.start_ns, recording.end_ns
             self.losses = [f"{file.path.name}: {loss}" for loss in recording.losses]
+            self.recorded = tuple(recording.channels)
             self._carried = [self._carry(entry) for entry in recording.channels]
         self.channels = [
             ChannelSummary(carried.connection, entry.count)

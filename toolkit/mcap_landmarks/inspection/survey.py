@@ -2,30 +2,37 @@
 
 from array import array
 from collections import Counter
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcap_landmarks.channels import ODOMETRY
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.geometry.frames import plain
+from mcap_landmarks.inspection.log_frames import LogFrames, frames_from
+from mcap_landmarks.inspection.odometry_examination import OdometryMessages
 from mcap_landmarks.inspection.open_logs import OpenLog
+from mcap_landmarks.inspection.topic_roles import message_type
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.header import frame_in, stamp_in
 from mcap_landmarks.messages.images import CameraInfo
-from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scan import LaserScan
-from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.progress import Progress
+from mcap_landmarks.recording.odometry_track import odometry_from
 from mcap_landmarks.sources import merge
 from mcap_landmarks.stage import Connection, RawMessage
 
-SENSORS = ("image", "camera_info", "scan", "odometry", "scene_objects")
+SENSORS = ("image", "camera_info", "scan", "point_cloud", "odometry", "scene_objects")
 """The roles that are looked at."""
 
 _MOST_SCANS = 400
+_CLOUDS_SPARED = 10
+"""Clouds are large: of so many that would be decoded one is."""
 _MOST_TRANSFORMS = 300
 """So many of a topic are decoded, spread over the log or its first: which beams and frames there are shows soon."""
 
@@ -67,13 +74,23 @@ class Returns:
 
 
 @dataclass(slots=True)
+class CloudSamples:
+    """Of a topic's clouds that were looked at, all of them and the empty ones, and how far the points of each reach."""
+
+    looked_at: int = 0
+    empty: int = 0
+    farthest_m: list[float] = field(default_factory=list)
+
+
+@dataclass(slots=True)
 class Survey:
-    """What a log's sensors gave. `edges` are parent and child of transforms, `bases` what odometry is of."""
+    """What a log's sensors gave: the first transform of each parent and child, and odometry by topic."""
 
     sensors: list[Sensor] = field(default_factory=list)
-    edges: set[tuple[str, str]] = field(default_factory=set)
-    bases: set[str] = field(default_factory=set)
+    transforms: dict[tuple[str, str], Transform] = field(default_factory=dict)
+    odometry: dict[str, OdometryMessages] = field(default_factory=dict)
     returns: dict[str, Returns] = field(default_factory=dict)
+    clouds: dict[str, CloudSamples] = field(default_factory=dict)
     uncalibrated: set[str] = field(default_factory=set)
     unreadable: Counter[str] = field(default_factory=Counter)
 
@@ -81,15 +98,28 @@ class Survey:
         """The sensors of a role."""
         return [sensor for sensor in self.sensors if sensor.role == role]
 
+    @property
+    def edges(self) -> set[tuple[str, str]]:
+        """Parent and child of each transform."""
+        return {*self.transforms}
+
+    @property
+    def bases(self) -> set[str]:
+        """What odometry is of."""
+        return {child for messages in self.odometry.values() for _, child in messages.frames[:1]}
+
+    def log_frames(self) -> LogFrames:
+        """The frames that the transforms connect."""
+        return frames_from(self.transforms.values())
+
 
 def survey(log: OpenLog, roles: Mapping[str, Sequence[str]], progress: Progress | None = None) -> Survey:
-    """Look at a log once; `roles` are topics by role."""
+    """Look at a log once, at all of it: damage shows only where it is read; `roles` are topics by role."""
     found = Survey()
     sensors = {topic: Sensor(role, topic) for role in SENSORS for topic in roles.get(role, ())}
     found.sensors = list(sensors.values())
     strides = _strides(log)
-    wanted = _wanted(log, sensors)
-    pieces = [(part.start_ns or 0, partial(part.messages, wanted, None, None, progress)) for part in log.parts]
+    pieces = [(part.start_ns or 0, partial(part.messages, None, None, None, progress)) for part in log.parts]
     transforms = Counter[Connection]()
     for raw in merge(pieces):
         sensor = sensors.get(raw.connection.topic)
@@ -101,12 +131,6 @@ def survey(log: OpenLog, roles: Mapping[str, Sequence[str]], progress: Progress 
         except MessageError:
             found.unreadable[raw.connection.topic] += 1
     return found
-
-
-def _wanted(log: OpenLog, sensors: Container[str]) -> list[Connection]:
-    """The connections of the sensors' topics, and of transforms."""
-    connections = (entry.connection for part in log.parts for entry in part.channels)
-    return [one for one in connections if one.topic in sensors or one.message_type == TFMessage.ROS_TYPE]
 
 
 def _strides(log: OpenLog) -> dict[str, int]:
@@ -122,7 +146,7 @@ def _transforms(raw: RawMessage, found: Survey, seen: Counter[Connection]) -> No
     seen[raw.connection] += 1
     if seen[raw.connection] <= _MOST_TRANSFORMS or raw.connection.topic.endswith("_static"):
         for step in decode(TFMessage, raw.data).transforms:
-            found.edges.add((plain(step.frame_id), plain(step.child_frame_id)))
+            found.transforms.setdefault((plain(step.frame_id), plain(step.child_frame_id)), step)
 
 
 def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
@@ -132,18 +156,30 @@ def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
     sensor.stamp_ns.append(stamp_ns)
     if ros_type == LaserScan.ROS_TYPE and number % stride == 0:
         _look_at_scan(decode(LaserScan, raw.data), sensor, found.returns)
+    if sensor.role == "point_cloud" and number % (stride * _CLOUDS_SPARED) == 0:
+        _look_at_cloud(decode(PointCloud2, raw.data), found.clouds.setdefault(sensor.topic, CloudSamples()))
+    if sensor.role == "odometry":
+        odometry = odometry_from(decode(message_type(ODOMETRY, raw.connection), raw.data))
+        if odometry is not None:
+            found.odometry.setdefault(sensor.topic, OdometryMessages()).take(raw.log_time_ns, odometry)
     if number or ros_type == TFMessage.ROS_TYPE:
         return
     sensor.frame = plain(frame_in(raw.data))
-    if ros_type == Odometry.ROS_TYPE:
-        found.bases.add(plain(decode(Odometry, raw.data).child_frame_id))
-    elif ros_type == CameraInfo.ROS_TYPE and not decode(CameraInfo, raw.data).intrinsics[0, 0] > 0:
+    if ros_type == CameraInfo.ROS_TYPE and not decode(CameraInfo, raw.data).intrinsics[0, 0] > 0:
         found.uncalibrated.add(sensor.topic)
 
 
 def _first_stamp_ns(data: bytes | memoryview) -> int:
     transforms = decode(TFMessage, data).transforms
     return transforms[0].stamp_ns if transforms else 0
+
+
+def _look_at_cloud(cloud: PointCloud2, seen: CloudSamples) -> None:
+    points = cloud.points_m[np.isfinite(cloud.points_m).all(axis=1)]
+    seen.looked_at += 1
+    seen.empty += not len(points)
+    if len(points):
+        seen.farthest_m.append(float(np.quantile(np.linalg.norm(points, axis=1), 0.95)))
 
 
 def _look_at_scan(scan: LaserScan, sensor: Sensor, returns: dict[str, Returns]) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcap_landmarks.geometry.angles import yaw_from_quaternion
-from mcap_landmarks.messages.typestore import RosObject, typestore
+from mcap_landmarks.messages.typestore import RosObject, full_name, typestore
 
 Array = NDArray[np.float64]
 PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
@@ -21,7 +21,7 @@ def make(ros_type: str, **fields: object) -> RosObject:
 
 @cache
 def _class(ros_type: str) -> Callable[..., RosObject]:
-    return typestore().types[ros_type.replace("/", "/msg/")]
+    return typestore().types[full_name(ros_type)]
 
 
 def stamp_to_ros(stamp_ns: int) -> RosObject:

@@ -27,6 +27,11 @@ def typestore() -> Typestore:
     return store
 
 
+def full_name(ros_type: str) -> str:
+    """The name of a type as ROS 2 has it, `nav_msgs/msg/Odometry`, of that or of ROS 1's without `msg`."""
+    return ros_type.replace("/", "/msg/") if ros_type.count("/") == 1 else ros_type
+
+
 @cache
 def definition(ros_type: str) -> str:
     """The `ros2msg` schema text of a type such as `nav_msgs/msg/Odometry`, with all that it needs."""

@@ -108,6 +108,14 @@ def set_back(log_ns: Times, stamp_ns: Times) -> list[tuple[int, int]]:
     return found
 
 
+def shifts_of(log_ns: Times, stamp_ns: Times) -> tuple[tuple[int, ...], int | None]:
+    """How far a clock was set back by and by, from 0 on, and the log time of the first time; of messages (N,)."""
+    good = ~strays(log_ns, stamp_ns) & (stamp_ns != 0)
+    backs = set_back(log_ns[good], stamp_ns[good])
+    shifts = np.cumsum([0, *(by_ns for _, by_ns in backs)])
+    return tuple(shifts.tolist()), backs[0][0] if backs else None
+
+
 def clock_of(log_ns: Times, stamp_ns: Times, shifts_ns: tuple[int, ...] = (0,), first_ns: int | None = None) -> Clock:
     """The clock of a topic's messages (N,): `shifts_ns` are those of the log, `first_ns` the log time of the first."""
     bad = strays(log_ns, stamp_ns)

@@ -11,6 +11,7 @@ from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, ODOMETRY, TF_STATIC
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.geometry.frames import is_rigid
 from mcap_landmarks.inspection.examination import Examined
+from mcap_landmarks.inspection.format_checks import told_formats
 from mcap_landmarks.inspection.odometry_examination import STRAY
 from mcap_landmarks.inspection.topic_roles import ROLES, Choice, choose, could_be, message_type
 from mcap_landmarks.maps.scene_objects import usable
@@ -124,7 +125,8 @@ def _missing(recording: Readable, channel: Channel[Message], empty: bool) -> str
     types = " or ".join(role.types)
     present = [(entry.connection.topic, entry.connection.message_type) for entry in recording.channels]
     remedy = f"choose a topic with {role.option}, or take a log that has one, such as {channel.topic}"
-    return f"{recording.path}: there is no {role.name} ({types}); {could_be(present, channel) or remedy}"
+    told = told_formats(recording.channels) or could_be(present, channel) or remedy
+    return f"{recording.path}: there is no {role.name} ({types}); {told}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

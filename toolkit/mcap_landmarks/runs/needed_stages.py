@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable, Sequence
 
 from mcap_landmarks.channels import RESULTS, SHARED
 from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.inspection.format_checks import told_formats
 from mcap_landmarks.inspection.topic_roles import ROLES, could_be
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.runs.recorded_log import RecordedLog
@@ -70,9 +71,10 @@ class _LackingError(RecordingError):
         )
         present = [(entry.connection.topic, entry.connection.message_type) for entry in own.channels]
         hints = [hint for source in sources if (hint := could_be(present, source))]
+        formats = told_formats(own.channels)
         super().__init__(
             f"{log.path}: there is no {_name(channel)}, and no {' or '.join(map(_name, sources))} to make it from; "
-            f"{'; '.join(hints) or remedy}"
+            f"{formats or '; '.join(hints) or remedy}"
         )
         self.sources = sources
 

@@ -27,7 +27,8 @@ class StageInput:
     """What a stage reads of a log (an `InputLog`); `reading` says what became of the messages.
 
     Raises:
-        RecordingError: a channel that the stage requires is missing or has no messages.
+        RecordingError: a channel that the stage requires is missing or has no messages, or is odometry that cannot be
+            used.
         UsageError: several topics could be meant, or the one that was chosen is of another type.
     """
 
@@ -40,7 +41,14 @@ class StageInput:
         self.primary = self._primaries[0]
         cameras = cameras_of(log, span.choice) if {CAMERA_IMAGE, CAMERA_INFO} & {*self._inputs.values()} else NO_CAMERAS
         self._correction = Correction(self._examined(examiner), self._frames_of(cameras))
-        self.notes = (*cameras.notes(), *self._odometry.notes)
+        refusal = self._odometry.refusal
+        if refusal and ODOMETRY in stage.required:
+            raise RecordingError(f"{self.path}: {refusal}")
+        self.notes = (
+            *cameras.notes(),
+            *self._odometry.notes,
+            *([f"goes on without odometry: {refusal}"] * bool(refusal)),
+        )
 
     @property
     def count(self) -> int:
@@ -88,11 +96,7 @@ class StageInput:
         return {entry: frame for entry, frame in told.items() if frame is not None} or info_frames(self._log, infos)
 
     def _examined(self, examiner: Examiner | None) -> Examined | None:
-        """What is known of stamps, frames and odometry; nothing where the stage looks at images alone.
-
-        Raises:
-            RecordingError: the odometry cannot be used.
-        """
+        """What is known of stamps, frames and odometry; nothing where the stage looks at images alone."""
         if self.primary in self._inputs and self._inputs[self.primary] == CAMERA_IMAGE:
             return None
         examiner = examiner or Examiner(self._span.start_ns, self._span.end_ns)
@@ -103,10 +107,7 @@ class StageInput:
             for connection, channel in self._inputs.items()
             if channel == DETECTIONS or connection not in made
         }
-        examined = examiner.examine(self._log, Asked(self._inputs, self.primary, made, offsets_ns))
-        if examined.odometry is not None and examined.odometry.refusal:
-            raise RecordingError(f"{self.path}: {examined.odometry.refusal}")
-        return examined
+        return examiner.examine(self._log, Asked(self._inputs, self.primary, made, offsets_ns))
 
     @property
     def _odometry(self) -> ExaminedOdometry:

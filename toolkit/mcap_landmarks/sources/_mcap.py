@@ -2,6 +2,7 @@
 
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.messages.qos import KEY, qos_profile
+from mcap_landmarks.messages.typestore import full_name
 from mcap_landmarks.sources._db3 import unpacked
 from mcap_landmarks.sources._ros1_types import converted
 from mcap_landmarks.sources._shape import Carried, Payload
@@ -13,7 +14,7 @@ def carry(connection: Connection) -> Carried | None:
     topic, encoding = connection.topic, connection.schema_encoding
     if connection.message_encoding == "cdr":
         metadata = {KEY: "", **connection.metadata}
-        kept = Connection(topic, connection.message_type, connection.schema, encoding, metadata=metadata)
+        kept = Connection(topic, full_name(connection.message_type), connection.schema, encoding, metadata=metadata)
         return Carried(kept, unpacked)
     if connection.message_encoding != "ros1" or encoding != "ros1msg":
         return None

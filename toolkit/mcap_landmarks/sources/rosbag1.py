@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.messages.qos import KEY, qos_profile
+from mcap_landmarks.messages.typestore import full_name
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.sources._bag_container import MAGIC, BagConnection, BagMessage, ChunkInfo, DamagedBagError
 from mcap_landmarks.sources._bag_index import BagIndex, read_chunk, read_index
@@ -155,7 +156,7 @@ def _carried(described: BagConnection) -> tuple[Connection, Convert | MessageErr
     try:
         type_ = converted(described.ros_type, described.definition)
     except MessageError as error:
-        return Connection(topic, described.ros_type.replace("/", "/msg/"), b"", metadata=metadata), error
+        return Connection(topic, full_name(described.ros_type), b"", metadata=metadata), error
     return Connection(topic, type_.message_type, type_.definition.encode(), metadata=metadata), type_.convert
 
 
