@@ -1,18 +1,21 @@
 """The verb evaluate."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import jsonschema
+import numpy as np
 import pytest
-from mcap_landmarks.channels import TRUTH_OBJECTS, TRUTH_POSE
+from mcap_landmarks.channels import POSE, TRUTH_OBJECTS, TRUTH_POSE
 from mcap_landmarks.cli.console import DONE, PARTIAL, UNUSABLE, USAGE, run_command
 from mcap_landmarks.cli.main import build
 from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.resources import resource
 
-from tests.diff.recordings import localized_log, localized_messages, write
+from tests.diff.recordings import START_NS, localized_log, localized_messages, write
 from tests.maps.examples import small_map
 
 DATA = Path(__file__).parents[1] / "data"
@@ -57,6 +60,25 @@ def test_the_table_tells_units_and_cases(log: Path, capsys: pytest.CaptureFixtur
         " deg",
     ):
         assert text in out
+
+
+def test_a_robot_that_stands_is_aligned_by_headings_or_not_at_all(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times = [START_NS + i * 10**8 for i in range(20)]
+    spot = np.array([2.0, 1.0, 2.0])
+    off = np.random.default_rng(0).normal(0, [0.01, 0.01, 0.001], (20, 3))
+    truth = [(TRUTH_POSE, time_ns, PoseStamped.planar(time_ns, "map", np.zeros(3))) for time_ns in times]
+    found = [(POSE, t, PoseStamped.planar(t, "map", spot + error)) for t, error in zip(times, off, strict=True)]
+    log = write(tmp_path / "stands.mcap", [*truth, *found])
+    told = document(capsys, log, "--align")
+    assert told["alignment"]["rotation_from"] == "headings"
+    assert told["heading"]["rmse_deg"] < 0.1
+    assert run(log, "--align") == DONE
+    assert "headings, sigma 0.01" in capsys.readouterr().out
+    bare = [(POSE, pose.stamp_ns, replace(pose, orientation_xyzw=np.zeros(4))) for _, _, pose in found]
+    assert run(write(tmp_path / "bare.mcap", [*truth, *bare]), "--align") == USAGE
+    assert "bare.mcap: the 20 poses hardly move" in capsys.readouterr().err
 
 
 def test_exports_come_back_as_reference(log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,6 +18,8 @@ from mcap_landmarks.geometry.se2 import compose
 PAIRING = partial(interpolated, max_gap_ns=10**9)
 APPENDIX_D = Path(__file__).parents[1] / "data" / "thesis_appendix_d.txt"
 POSES = arrays(np.float64, st.tuples(st.integers(2, 30), st.just(3)), elements=st.floats(-3, 3))
+PATHS = arrays(np.float64, st.tuples(st.integers(10, 30), st.just(3)), elements=st.floats(-3, 3))
+"""Long enough to be aligned by their positions."""
 MOTIONS = st.tuples(st.floats(-100, 100), st.floats(-100, 100), st.floats(-3.14, 3.14)).map(np.array)
 
 
@@ -90,7 +92,7 @@ def test_a_perfect_estimate_has_no_error(poses: np.ndarray) -> None:
 
 @pytest.mark.slow
 @settings(max_examples=50)
-@given(POSES, MOTIONS, st.integers(0, 100))
+@given(PATHS, MOTIONS, st.integers(0, 100))
 def test_alignment_makes_the_frame_of_the_estimate_irrelevant(poses: np.ndarray, motion: np.ndarray, seed: int) -> None:
     rng = np.random.default_rng(seed)
     poses = poses + np.column_stack([np.arange(len(poses)) * 5, np.zeros((len(poses), 2))])
@@ -113,7 +115,8 @@ def test_alignment_makes_the_frame_of_the_estimate_irrelevant(poses: np.ndarray,
 def test_the_alignment_is_told() -> None:
     poses = np.array([[0.0, 0, 0], [4, 0, 0], [4, 4, 1]])
     found = figures(timed(compose(np.array([2.0, 3, np.pi / 2]), poses)), timed(poses), aligned=True)
-    assert found["alignment"] == pytest.approx({"x_m": -3, "y_m": 2, "heading_deg": -90})
+    assert found["alignment"].pop("rotation_from") == "positions"
+    assert found["alignment"] == pytest.approx({"x_m": -3, "y_m": 2, "heading_deg": -90, "rotation_sigma_deg": 0})
 
 
 def test_nothing_scored_gives_no_figures() -> None:

@@ -57,6 +57,7 @@ def command(
     The truth is RESULT's own /ground_truth channels, or those of --reference.
     """
     from mcap_landmarks.atomic import check_target
+    from mcap_landmarks.errors import UsageError
     from mcap_landmarks.evaluation.metrics import evaluate
     from mcap_landmarks.evaluation.read import read_reference, read_run
 
@@ -70,7 +71,10 @@ def command(
         truth, losses = other.over(truth), losses + more
     _check(result, run, truth)
     pairing = _pairing(association, max_gap)
-    document = evaluate(run, truth, pairing, aligned=align)
+    try:
+        document = evaluate(run, truth, pairing, aligned=align)
+    except UsageError as error:
+        raise UsageError(f"{result}: {error}") from error
     _export(run, truth, pairing, tum, thesis)
     if document["localized"] and not document["scored"] and truth.trajectory is not None:
         warn(f"note: {result}: no pose has a truth near enough in time; see --max-gap and --association")
@@ -183,7 +187,9 @@ def _print_poses(document: "Evaluation") -> None:
     ]
     if fit:
         moved = f"{fit['x_m']:.3f} m, {fit['y_m']:.3f} m, {fit['heading_deg']:.3f} deg"
-        rows.append(["truth from estimate", moved])
+        sigma = fit["rotation_sigma_deg"]
+        surely = "" if sigma is None else f", sigma {sigma:.3f} deg"
+        rows += [["truth from estimate", moved], ["its rotation is from", f"{fit['rotation_from']}{surely}"]]
     table(["figure", "value"], rows)
 
 

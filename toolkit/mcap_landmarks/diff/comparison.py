@@ -14,7 +14,7 @@ from mcap_landmarks.diff.maps import FIELDS, diff_maps
 from mcap_landmarks.diff.metric_rows import metric_names, metric_rows
 from mcap_landmarks.diff.tolerances import Declared, asked, declared
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.evaluation.metrics import alignment_document
+from mcap_landmarks.evaluation.alignment import transform_document
 from mcap_landmarks.evaluation.read import is_database
 from mcap_landmarks.locations import Location, size_of
 from mcap_landmarks.manifest import RUN
@@ -111,11 +111,12 @@ def _of_maps(
     limits = {part: {**ours.get(part, {}), **given.get(part, {})} for part in FIELDS}
     found = diff_maps(read_map(baseline), read_map(candidate), _lookup(limits), aligned=aligned)
     metrics, losses = metric_rows(baseline, candidate, reference)
+    moved = found.baseline_from_candidate
     document = _document(
         {"landmarks": found.landmarks, "groups": found.groups},
         manifest=[*found.manifest, *manifest_rows(read_manifest(baseline), read_manifest(candidate))],
         metrics=metrics,
-        alignment=alignment_document(found.baseline_from_candidate),
+        alignment=None if moved is None else transform_document(moved),
         identical=_equal_bytes(baseline, candidate),
     )
     return _judged(document, conditions, FIELDS, losses)

@@ -24,6 +24,12 @@ def fit(src_xy: Array, dst_xy: Array) -> Array:
     return np.array([x[0], y[0], np.arctan2(sine[0], cosine[0])])
 
 
+def transform_document(dst_from_src: Array) -> dict[str, float]:
+    """A transform (3,) for a document, in metres and degrees."""
+    x_m, y_m, heading_rad = dst_from_src.tolist()
+    return {"x_m": x_m, "y_m": y_m, "heading_deg": float(np.degrees(heading_rad))}
+
+
 def search(
     src_xy: Array, dst_xy: Array, comparable: NDArray[np.bool_], tolerance_m: float
 ) -> tuple[Array, NDArray[np.int64]]:

@@ -6,8 +6,8 @@ from typing import TypedDict
 
 import numpy as np
 
-from mcap_landmarks.evaluation.alignment import fit
 from mcap_landmarks.evaluation.landmark_metrics import landmark_figures
+from mcap_landmarks.evaluation.pose_alignment import PoseAlignment, align_poses
 from mcap_landmarks.evaluation.pose_metrics import (
     Figures,
     align,
@@ -58,27 +58,30 @@ class Reference:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScoredPoses:
-    """K estimated poses that have a reference (K, 3), after the alignment if there is one.
+    """K estimated poses that have a reference (K, 3), after the `alignment` if there is one.
 
-    rows (K,) are their places in the estimate, reference_from_estimate (3,) is the fit that was applied, or None.
+    rows (K,) are their places in the estimate.
     """
 
     rows: Indices
     estimate: Array
     covariances: Array
     reference: Array
-    reference_from_estimate: Array | None
+    alignment: PoseAlignment | None
 
 
 def score(estimate: Trajectory, reference: Reference, pairing: Pairing, *, aligned: bool) -> ScoredPoses:
-    """Pair poses with the reference in time; `aligned` moves them by the one SE(2) that fits their positions best."""
+    """Pair poses with the reference in time; `aligned` moves them by the one SE(2) that fits them best.
+
+    Raises:
+        UsageError: they cannot be aligned; see `align_poses`.
+    """
     rows, truth = pairing(estimate, reference.trajectory or NOWHERE)
     poses, covariances = estimate.poses[rows], estimate.covariances[rows]
-    transform = None
-    if aligned:
-        transform = fit(poses[:, :2], truth[:, :2])
-        poses, covariances = align(transform, poses, covariances)
-    return ScoredPoses(rows, poses, covariances, truth, transform)
+    alignment = align_poses(poses, truth) if aligned and len(rows) else None
+    if alignment is not None:
+        poses, covariances = align(alignment.reference_from_estimate, poses, covariances)
+    return ScoredPoses(rows, poses, covariances, truth, alignment)
 
 
 class Evaluation(TypedDict):
@@ -96,13 +99,16 @@ class Evaluation(TypedDict):
     nees: float | None
     rpe: float | None
     map: Figures | None
-    alignment: dict[str, float] | None
+    alignment: dict[str, float | str | None] | None
 
 
 def evaluate(run: RunResult, reference: Reference, pairing: Pairing, *, aligned: bool = False) -> Evaluation:
     """How good a run and its map are.
 
     Figures are over scored poses: those that have a reference; figures and shares of nothing are None.
+
+    Raises:
+        UsageError: the poses cannot be `aligned`.
     """
     scored = score(run.trajectory, reference, pairing, aligned=aligned)
     errors = pose_errors(scored.estimate, scored.reference)
@@ -123,13 +129,5 @@ def evaluate(run: RunResult, reference: Reference, pairing: Pairing, *, aligned:
         "nees": nees(errors, scored.covariances),
         "rpe": relative_pose_error(scored.estimate, scored.reference),
         "map": None if landmarks is None or objects is None else landmark_figures(landmarks, objects),
-        "alignment": alignment_document(scored.reference_from_estimate),
+        "alignment": scored.alignment.document() if scored.alignment is not None else None,
     }
-
-
-def alignment_document(transform: Array | None) -> dict[str, float] | None:
-    """The field `alignment` of a document: a transform (3,) in metres and degrees, or None."""
-    if transform is None:
-        return None
-    x_m, y_m, heading_rad = transform.tolist()
-    return {"x_m": x_m, "y_m": y_m, "heading_deg": float(np.degrees(heading_rad))}

@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.evaluation.alignment import fit
 from mcap_landmarks.evaluation.landmark_metrics import associate
 from mcap_landmarks.evaluation.metrics import Reference, RunResult, ScoredPoses, score
@@ -60,7 +60,10 @@ def gather(paths: Sequence[Location], *, aligned: bool, progress: Progress | Non
         result, reference, problems = read_run(path, progress)
         losses.extend(f"{path}: {problem}" for problem in problems)
         groups = read_map(path).groups if not result.bundles and result.landmarks is not None else ()
-        drawing = _with(drawing, path.stem, result, reference, groups, aligned=aligned)
+        try:
+            drawing = _with(drawing, path.stem, result, reference, groups, aligned=aligned)
+        except UsageError as error:
+            raise UsageError(f"{path}: {error}") from error
     if drawing.landmarks is None and drawing.objects is None and not drawing.runs:
         raise RecordingError(f"{paths[0]}: has neither poses nor landmarks to draw; run map or localize first")
     if aligned and not any(len(run.scored.rows) for run in drawing.runs):
@@ -80,11 +83,11 @@ def _with(
     pairing = partial(interpolated, max_gap_ns=_MAX_GAP_NS)
     scored = score(result.trajectory, reference, pairing, aligned=aligned)
     estimate = result.trajectory
-    if scored.reference_from_estimate is not None and len(scored.rows):
-        moved = align(scored.reference_from_estimate, estimate.poses, estimate.covariances)
-        estimate = Trajectory(estimate.time_ns, *moved)
+    if scored.alignment is not None:
+        transform = scored.alignment.reference_from_estimate
+        estimate = Trajectory(estimate.time_ns, *align(transform, estimate.poses, estimate.covariances))
         if not drawing.runs:
-            drawing = _moved(drawing, scored.reference_from_estimate)
+            drawing = _moved(drawing, transform)
     run = Run(name, estimate, result.continuous, reference.trajectory, scored)
     return replace(drawing, runs=(*drawing.runs, run))
 
