@@ -74,6 +74,24 @@ def test_results_replace_older_results(folder: Path, tmp_path: Path) -> None:
     assert topics(tmp_path / "b.mcap")[MATCH.topic] == 120
 
 
+def test_a_mapped_log_keeps_its_path_when_it_is_localized(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Markers of a map are on one topic, whoever drew them last; what nothing replaces stays."""
+    assert call("localize", folder / "mapped.mcap", "--map", folder / "a.db", "-o", tmp_path / "both.mcap") == 0
+    told = capsys.readouterr().err
+    assert "build_map's /landmarks/map_markers in the log is left out: localize writes it, too" in told
+    before, after = topics(folder / "mapped.mcap"), topics(tmp_path / "both.mcap")
+    assert before.items() <= after.items()
+    assert after["/landmarks/path"] > 1
+    words = ("map", tmp_path / "both.mcap", "--map", tmp_path / "again.db", "-o", tmp_path / "again.mcap")
+    assert call(*words) == 0
+    assert "localize's /landmarks/map_markers in the log is left out" in capsys.readouterr().err
+    assert topics(tmp_path / "again.mcap") == after
+    assert call(*words[:-1], tmp_path / "anew.mcap") == 0  # what is only a part is not taken for the whole
+    assert topics(tmp_path / "anew.mcap")["/landmarks/map_markers"] == 1
+
+
 def test_results_only(folder: Path, tmp_path: Path) -> None:
     words = ("localize", folder / "b.mcap", "--map", folder / "a.db", "-o", tmp_path / "r.mcap", "--results-only")
     assert call(*words) == 0

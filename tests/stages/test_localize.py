@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap_landmarks.channels import MAP, MATCH, POSE, POSE_COVARIANCE, SCENE_OBJECTS, TF
+from mcap_landmarks.channels import LOCALIZED_PATH, MAP, MAP_MARKERS, MATCH, POSE, POSE_COVARIANCE, SCENE_OBJECTS, TF
 from mcap_landmarks.maps.database import write_map
 from mcap_landmarks.maps.exchange_thesis import parse_map
 from mcap_landmarks.maps.model import LandmarkMap, MapSource
@@ -65,6 +65,22 @@ def test_unique_classes_need_no_sequence(tmp_path: Path) -> None:
     found = localized(tmp_path, LocalizeConfig(), unique=True)
     assert errors_m(found).max() < 0.3
     assert statuses(found) == [Status.LOCALIZED] * len(circle())
+
+
+def test_a_viewer_gets_the_map_at_once_and_the_path_while_it_grows(tmp_path: Path) -> None:
+    found = localized(tmp_path, LocalizeConfig(), unique=True)
+    markers, *paths = [stamped for stamped in found if stamped.channel in {MAP_MARKERS, LOCALIZED_PATH}]
+    poses = [stamped.message for stamped in found if stamped.channel == POSE]
+    assert (markers.channel, markers.log_time_ns, markers.message.frame_id) == (
+        MAP_MARKERS,
+        found[0].log_time_ns,
+        "map",
+    )
+    assert len(markers.message.markers) == 2 * len(ring()[0])
+    assert 30 < len(paths) < 60
+    assert [pose.stamp_ns for pose in paths[-1].message.poses] == [pose.stamp_ns for pose in poses]
+    assert paths[-1].log_time_ns == max(stamped.log_time_ns for stamped in found)
+    assert all(path.message.poses[-1].stamp_ns == path.message.stamp_ns for path in paths)
 
 
 @pytest.mark.slow

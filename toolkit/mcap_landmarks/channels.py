@@ -41,6 +41,7 @@ MAP = Channel("/landmarks/map", SceneObjects)
 MATCH = Channel("/landmarks/match", LandmarkMatch)
 POSE = Channel("/landmarks/pose", PoseStamped)
 POSE_COVARIANCE = Channel("/landmarks/pose_cov", PoseWithCovarianceStamped)
+LOCALIZED_PATH = Channel("/landmarks/path", Path)
 
 TRUTH_POSE = Channel("/ground_truth/pose", PoseStamped)
 TRUTH_OBJECTS = Channel("/ground_truth/objects", SceneObjects)
@@ -52,6 +53,8 @@ NO_SCENES = frozenset({SCAN_OBJECTS.topic, MAP.topic, TRUTH_OBJECTS.topic})
 """Topics of ours whose messages are of the scenes' type, but are none."""
 SHARED = frozenset({TF.topic})
 """Topics that many write to: results there stand beside a log's own messages, elsewhere in their place."""
+DRAWN = frozenset({MAP_MARKERS.topic})
+"""Topics of ours that viewers draw and nothing reads: the stage that ran last has them, other results stay."""
 
 MAP_FRAME, ODOM_FRAME, BASE_FRAME = "map", "odom", "base_footprint"
 

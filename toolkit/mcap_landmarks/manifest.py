@@ -80,8 +80,8 @@ class StageRecord:
     `code` is a hash of the toolkit's sources, `resources` hashes by name. `inputs` names the recording by its
     fingerprint and the stages whose results were read by their keys. `options` are choices beside the configuration:
     topics, remaps, thinning. Results are the same if, and are reused only if, their keys are equal and they are whole:
-    an output of less time than its input carries older results on of which a part `is_cut` off. `origins` tells where
-    the resources come from that were chosen; the same file is the same file wherever it lay.
+    an output of less time than its input, or with other markers, carries older results on of which a part `is_cut`
+    off. `origins` tells where the resources come from that were chosen; the same file is the same file wherever it lay.
     """
 
     stage: str

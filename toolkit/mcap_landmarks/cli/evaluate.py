@@ -57,8 +57,6 @@ def command(
     The truth is RESULT's own /ground_truth channels, or those of --reference.
     """
     from mcap_landmarks.atomic import check_target
-    from mcap_landmarks.errors import UsageError
-    from mcap_landmarks.evaluation.metrics import evaluate
     from mcap_landmarks.evaluation.read import read_reference, read_run
 
     for target in (tum, thesis):
@@ -71,10 +69,7 @@ def command(
         truth, losses = other.over(truth), losses + more
     _check(result, run, truth)
     pairing = _pairing(association, max_gap)
-    try:
-        document = evaluate(run, truth, pairing, aligned=align)
-    except UsageError as error:
-        raise UsageError(f"{result}: {error}") from error
+    document = _evaluated(result, run, truth, pairing, aligned=align)
     _export(run, truth, pairing, tum, thesis)
     if document["localized"] and not document["scored"] and truth.trajectory is not None:
         warn(f"note: {result}: no pose has a truth near enough in time; see --max-gap and --association")
@@ -105,6 +100,18 @@ def _pairing(association: PoseAssociation, max_gap_s: float) -> "Pairing":
     if association is PoseAssociation.NEAREST:
         return partial(nearest, max_difference_ns=10_000_000)
     return partial(interpolated, max_gap_ns=round(max_gap_s * 1e9))
+
+
+def _evaluated(
+    result: Location, run: "RunResult", truth: "Reference", pairing: "Pairing", *, aligned: bool
+) -> "Evaluation":
+    from mcap_landmarks.errors import UsageError
+    from mcap_landmarks.evaluation.metrics import evaluate
+
+    try:
+        return evaluate(run, truth, pairing, aligned=aligned)
+    except UsageError as error:
+        raise UsageError(f"{result}: {error}") from error
 
 
 def _export(

@@ -16,7 +16,10 @@ Declared = Mapping[str, Mapping[str, Tolerance]]
 
 
 def declared() -> Declared:
-    """Tolerances by topic and field, as the stages that write the topics or the database declare them."""
+    """Tolerances by topic and field, as the stages that write the topics or the database declare them.
+
+    Of two stages that write a topic the wider one counts.
+    """
     found: dict[str, dict[str, Tolerance]] = {}
     for stage in map(find_stage, stage_names()):
         fields = {
@@ -25,7 +28,10 @@ def declared() -> Declared:
         }
         parts = MAP_FIELDS if isinstance(stage, Reduction) else ()  # it makes the database
         for name in (*parts, *(channel.topic for channel in stage.writes)):
-            found.setdefault(name, {}).update(fields)
+            known = found.setdefault(name, {})
+            for field, limit in fields.items():
+                other = known.get(field, limit)
+                known[field] = Tolerance(*map(max, limit, other))
     return found
 
 

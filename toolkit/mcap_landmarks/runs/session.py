@@ -7,7 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mcap_landmarks.channels import SHARED
+from mcap_landmarks.channels import DRAWN, SHARED
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.inspection.examination import Examiner
 from mcap_landmarks.inspection.topic_roles import chosen_before
@@ -157,7 +157,8 @@ class Session:
         """The results for an output, by stage, and what is to be said of those that are left out.
 
         These are such as were made from results that are not the ones for the output, and such as lie on a topic that a
-        stage of the run writes. Where only results are asked for, those of the run's own stages are meant.
+        stage of the run writes; of what is only drawn that topic alone. Where only results are asked for, those of the
+        run's own stages are meant.
         """
         kept = dict(sorted(self.results.items()))
         if self.request.results_only:
@@ -169,7 +170,10 @@ class Session:
         while stale := _stale(kept, notes):
             left_out = "results in the log were made from results that changed; they are left out"
             notes.update({name: f"{name}'s {left_out}" for name in stale})
-        return [layer for name, layer in kept.items() if name not in notes], list(notes.values())
+        layers, told = _with_one_drawing(
+            {name: layer for name, layer in kept.items() if name not in notes}, self.of_this_run
+        )
+        return layers, [*notes.values(), *told]
 
     def own_without(self, topics: Collection[str]) -> Layer:
         """The log's own messages, without those on topics that results are on instead."""
@@ -209,7 +213,27 @@ def _replaced(layers: Mapping[str, Layer], of_this_run: Collection[str]) -> dict
 
 
 def _topics(layer: Layer) -> set[str]:
-    return {entry.connection.topic for entry in layer.channels} - SHARED
+    return {entry.connection.topic for entry in layer.channels} - SHARED - DRAWN
+
+
+def _drawn(layer: Layer) -> set[str]:
+    return {entry.connection.topic for entry in layer.channels} & DRAWN
+
+
+def _with_one_drawing(layers: Mapping[str, Layer], of_this_run: Collection[str]) -> tuple[list[Layer], list[str]]:
+    """Results without what a stage of this run draws on the same topic, and what is to be said of it.
+
+    The record of such results says that they are only a part.
+    """
+    writers = {topic: name for name, layer in layers.items() if name in of_this_run for topic in _drawn(layer)}
+    kept, notes = [], []
+    for name, layer in layers.items():
+        covered = set[str]() if name in of_this_run else _drawn(layer) & writers.keys()
+        notes += [f"{name}'s {topic} in the log is left out: {writers[topic]} writes it, too" for topic in covered]
+        left = tuple(entry for entry in layer.channels if entry.connection.topic not in covered)
+        part = layer.record and replace(layer.record, is_cut=True)
+        kept.append(replace(layer, channels=left, record=part) if covered else layer)
+    return kept, notes
 
 
 def _stale(layers: Mapping[str, Layer], gone: Collection[str]) -> list[str]:

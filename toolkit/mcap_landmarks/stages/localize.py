@@ -7,7 +7,9 @@ from itertools import islice
 import numpy as np
 
 from mcap_landmarks.channels import (
+    LOCALIZED_PATH,
     MAP,
+    MAP_MARKERS,
     MATCH,
     ODOM_FRAME,
     ODOMETRY,
@@ -23,6 +25,7 @@ from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.geometry.se2 import compose, inverse
 from mcap_landmarks.localization.class_association import unique_classes
 from mcap_landmarks.localization.config import LocalizeConfig
+from mcap_landmarks.localization.drawn_path import DrawnPath
 from mcap_landmarks.localization.match import Match
 from mcap_landmarks.localization.repeated_classes import RepeatedClassLocalizer
 from mcap_landmarks.localization.thesis import locate_as_in_the_thesis
@@ -30,6 +33,7 @@ from mcap_landmarks.localization.unique_classes import UniqueClassLocalizer
 from mcap_landmarks.localization.validation import check_map
 from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.database import read_map, read_neighbours
+from mcap_landmarks.maps.map_markers import markers_from_map
 from mcap_landmarks.maps.map_message import scene_from_map
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.maps.scene_objects import standing
@@ -54,13 +58,31 @@ Locate = Callable[[Sequence[SceneObjects], Sequence[OdometryAt | None]], list[Ma
 def process(
     bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Location]
 ) -> Iterator[Stamped | Omission]:
-    """Match and pose of every bundle, the map once before the first; a transform that cannot be is an omission."""
+    """Match and pose of every bundle, the map and its markers once before the first, and the path while it grows.
+
+    A transform that cannot be is an omission.
+    """
+    path, last_ns = DrawnPath(), 0
+    for result in _results(bundles, config, resources):
+        yield result
+        if isinstance(result, Stamped) and (pose := result.get(POSE)):
+            last_ns = result.log_time_ns
+            if grown := path.add(pose):
+                yield Stamped(LOCALIZED_PATH, last_ns, grown)
+    if rest := path.rest():
+        yield Stamped(LOCALIZED_PATH, last_ns, rest)
+
+
+def _results(
+    bundles: Iterable[Bundle], config: LocalizeConfig, resources: Mapping[str, Location]
+) -> Iterator[Stamped | Omission]:
     landmark_map = _usable_map(resources["map"], config)
     locate, size = _method(resources["map"], landmark_map, config)
     stream, first = iter(bundles), True
     while batch := list(islice(stream, size)):
         if first:
             yield Stamped(MAP, batch[0].log_time_ns, scene_from_map(landmark_map, batch[0].stamp_ns))
+            yield Stamped(MAP_MARKERS, batch[0].log_time_ns, markers_from_map(landmark_map, batch[0].stamp_ns))
             first = False
         seen = [_standing(bundle, config) for bundle in batch]
         matches = locate([scene for scene, _ in seen], [bundle.odometry for bundle in batch])
@@ -150,7 +172,7 @@ def _has_parent(log: InputLog, frame: str) -> bool:
 STAGE = Stage(
     "localize",
     reads=(SCENE_OBJECTS, ODOMETRY, SCENE_VELOCITIES),
-    writes=(MAP, MATCH, POSE, POSE_COVARIANCE, TF),
+    writes=(MAP, MAP_MARKERS, MATCH, POSE, POSE_COVARIANCE, LOCALIZED_PATH, TF),
     config=LocalizeConfig,
     process=process,
     optional=(SCENE_VELOCITIES,),
