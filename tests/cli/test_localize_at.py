@@ -8,10 +8,10 @@ import jsonschema
 import numpy as np
 import pytest
 from mcap_landmarks.channels import MATCH, POSE
-from mcap_landmarks.cli.console import moment
 from mcap_landmarks.maps.database import read_map, write_map
 from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.moments import moment
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.resources import resource
 
@@ -92,7 +92,7 @@ def test_what_it_refuses(folder: Path, capsys: pytest.CaptureFixture[str]) -> No
     words = ("localize", folder / "log.mcap", "--map", folder / "map.db")
     line = refused(capsys, 2, *words, "--at", 10**12)
     assert "no bundle within 2 s" in line
-    assert "the nearest is at 59500000001" in line
+    assert "the nearest is at 1970-01-01T00:00:59.500000001Z" in line
     assert "nanoseconds" in refused(capsys, 2, *words, "--at", "noon")
     assert "leave -o out" in refused(capsys, 2, *words, "--at", 1, "-o", folder / "x.mcap")
     assert "--at TIME" in refused(capsys, 2, *words)

@@ -216,8 +216,8 @@ def test_explain_says_which_camera_saw_what(here: Path, capsys: pytest.CaptureFi
     capsys.readouterr()
     assert call("explain", here / "out.mcap", "--at", raw.log_time_ns, "-o", here / "picture.png") == 0
     said = capsys.readouterr().out
-    assert "person 0.90, fire hydrant 0.80, in the image of left_optical +20 ms beside the scan" in said
-    assert "person 0.90, fire hydrant 0.80, in the image of twin_optical +10 ms beside the scan" in said
+    assert "person 0.90, fire hydrant 0.80, in the image of left_optical 20 ms after the scan" in said
+    assert "person 0.90, fire hydrant 0.80, in the image of twin_optical 10 ms after the scan" in said
     assert (here / "picture.png").stat().st_size > 0
     assert call("explain", here / "out.mcap", "--at", raw.log_time_ns, "--json") == 0
     document = json.loads(capsys.readouterr().out)

@@ -18,10 +18,10 @@ def test_positions_stand_beside_the_truth() -> None:
     assert np.sqrt(np.mean(apart**2)).round(3) == 0.106  # recomputed from Appendix D
 
 
-def test_boxes_stand_at_the_median_error_of_each_axis() -> None:
+def test_boxes_stand_at_the_median_error_of_each_axis_and_say_it() -> None:
     drawing, _ = gather([APPENDIX_D], aligned=False)
     panels = errors_figure(drawing).axes
-    assert [axes.texts[0].get_text() for axes in panels] == ["0.022 m", "0.024 m"]
+    assert [axes.texts[0].get_text() for axes in panels] == ["+0.0101 m", "-0.0145 m"]
     signed = [float(np.median(line)) for axes in panels for line in _medians(axes)]
     np.testing.assert_allclose(signed, [0.0101, -0.0145], atol=5e-5)
 

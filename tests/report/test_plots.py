@@ -7,14 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap_landmarks.channels import MAP_POSE, MATCH, SCENE_OBJECTS, TRUTH_OBJECTS, TRUTH_POSE
+from matplotlib.quiver import Quiver
+from mcap_landmarks.channels import MAP_MARKERS, MAP_POSE, MATCH, SCENE_OBJECTS, TRUTH_OBJECTS, TRUTH_POSE
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.evaluation.trajectory import Trajectory
 from mcap_landmarks.geometry.se2 import compose, transform_points
 from mcap_landmarks.maps.database import write_map
+from mcap_landmarks.maps.map_markers import markers_from_map
 from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.poses import PoseStamped
-from mcap_landmarks.report.drawing import breaks, gather
+from mcap_landmarks.report.drawing import breaks, gather, waypoints
 from mcap_landmarks.report.plots import FORMATS, figure, save
 
 from tests.diff.recordings import LANDMARKS, START_NS, localized_log, localized_messages, write
@@ -58,6 +60,9 @@ def test_a_run_shows_positions_errors_and_what_is_false(log: Path) -> None:
         "suitcase",
         "true object",
         "true path",
+        "heading",
+        "start",
+        "end",
         "position",
         "its error",
         "over 1 m off",
@@ -76,6 +81,39 @@ def test_runs_are_told_apart(database: Path, log: Path, tmp_path: Path) -> None:
     assert "run: position" in shown
     assert "built: estimated path" in shown
     assert shown[:3] == ["fire hydrant", "person", "suitcase"]  # the first map counts
+
+
+def test_the_log_that_a_map_was_made_of_shows_its_landmarks(tmp_path: Path) -> None:
+    """They are in the log as markers only."""
+    there = LandmarkMap.surveyed(LANDMARKS.ids, LANDMARKS.classes, LANDMARKS.positions_xy, MapSource("import", "f"))
+    write(tmp_path / "mapped.mcap", [(MAP_MARKERS, START_NS, markers_from_map(there, START_NS))])
+    drawing, _ = gather([mapped_log(tmp_path / "path.mcap"), tmp_path / "mapped.mcap"], aligned=False)
+    assert drawing.landmarks is not None
+    assert drawing.landmarks.classes == LANDMARKS.classes
+    np.testing.assert_array_equal(drawing.landmarks.positions_xy, LANDMARKS.positions_xy)
+    assert legend(tmp_path / "mapped.mcap") == ["bench", "person", "suitcase"]
+
+
+def test_start_end_and_headings_of_a_path_are_marked(tmp_path: Path) -> None:
+    drawing, _ = gather([mapped_log(tmp_path / "m.mcap")], aligned=True)
+    axes = figure(drawing).axes[0]
+    marks = {line.get_label(): np.asarray(line.get_xydata()) for line in axes.get_lines()}
+    np.testing.assert_allclose(marks["start"], [[1, 2]], atol=1e-9)
+    np.testing.assert_allclose(marks["end"], [[5, 2]], atol=1e-9)
+    (arrows,) = [entry for entry in axes.collections if isinstance(entry, Quiver)]
+    np.testing.assert_allclose(np.arctan2(arrows.V, arrows.U), 0.1, atol=1e-9)
+
+
+def test_headings_are_marked_evenly_along_the_way() -> None:
+    """Where the robot stood for long there is one arrow, and a position without heading has none."""
+    x = np.concatenate([np.zeros(50), np.linspace(0, 10, 50)])
+    poses = np.column_stack([x, np.zeros((100, 2))])
+    poses[70, 2] = np.nan
+    found = waypoints(Trajectory.of(np.arange(100), poses), 10)
+    assert len(found) == 10
+    assert np.diff(found[:, 0]).min() > 0.7
+    assert not len(waypoints(Trajectory.of(np.arange(3), np.full((3, 3), np.nan)), 10))
+    assert len(waypoints(Trajectory.of(np.arange(3), np.zeros((3, 3))), 10)) == 1
 
 
 def test_positions_of_the_thesis_stand_alone() -> None:

@@ -6,7 +6,6 @@ import math
 import os
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from datetime import UTC, datetime
 
 from mcap_landmarks.errors import ToolkitError
 
@@ -105,13 +104,3 @@ def progress(label: str, total: int | None = None, unit: str = "bytes") -> Itera
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=total)
         yield lambda advance: bar.update(task, advance=advance)
-
-
-def moment(time_ns: int) -> str:
-    """RFC 3339 to the nanosecond, as --start and --end take it; a number where the calendar ends."""
-    seconds, rest = divmod(time_ns, 10**9)
-    try:
-        when = datetime.fromtimestamp(seconds, UTC)
-    except (OverflowError, ValueError, OSError):
-        return str(time_ns)
-    return f"{when:%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from mcap_landmarks.cli import options
-from mcap_landmarks.cli.console import DONE, USAGE, moment, progress, say, say_json, table, warn
+from mcap_landmarks.cli.console import DONE, USAGE, progress, say, say_json, table, warn
 from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.locations import Location, location, size_of
+from mcap_landmarks.moments import moment
 
 if TYPE_CHECKING:
     from mcap_landmarks.diff.comparison import Diff

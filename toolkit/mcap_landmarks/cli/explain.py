@@ -9,6 +9,7 @@ import typer
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, say_json, table
 from mcap_landmarks.locations import Location, location
+from mcap_landmarks.moments import moment
 
 if TYPE_CHECKING:
     from mcap_landmarks.evaluation.explain import Place, Situation
@@ -50,7 +51,7 @@ def command(
         from mcap_landmarks.report.explain_picture import explanation_figure
         from mcap_landmarks.report.plots import save
 
-        title = f"{result.name} at {situation.stamp_ns}: {_status(situation)}"
+        title = f"{result.name} at {moment(situation.stamp_ns)}: {_status(situation)}"
         with atomic_file(output) as stream:
             save(partial(explanation_figure, situation, places, view, title), stream, form)
     if json:
@@ -70,7 +71,7 @@ def _print(situation: "Situation", places: "tuple[Place, ...]", view: "SensorDat
     match = situation.match
     before = match.bundles_joined - 1 if match is not None else 0
     joined = f", judged together with what {before} bundles before it saw" if before > 0 else ""
-    say(f"bundle at {situation.stamp_ns}: {_status(situation)}{joined}")
+    say(f"bundle at {moment(situation.stamp_ns)}: {_status(situation)}{joined}")
     for line in sensed_lines(situation, view):
         say(line)
     if situation.scene is not None and len(situation.scene):

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mcap_landmarks.cli import options
-from mcap_landmarks.cli.console import PARTIAL, moment, progress, say, say_json, table, warn
+from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
 from mcap_landmarks.locations import Location, location
+from mcap_landmarks.moments import moment
 
 if TYPE_CHECKING:
     from mcap_landmarks.inspection.info import LogInfo

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mcap_landmarks.cli import options
-from mcap_landmarks.cli.console import PARTIAL, moment, progress, say, say_json, table, warn
+from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
 from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
+from mcap_landmarks.moments import moment
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.bundles import Reading

@@ -7,27 +7,30 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.channels import MAP, MAP_POSE, POSE, TRUTH_OBJECTS, TRUTH_POSE
+from mcap_landmarks.channels import MAP, MAP_MARKERS, MAP_POSE, POSE, TRUTH_OBJECTS, TRUTH_POSE
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.evaluation.metrics import Reference, RunResult
 from mcap_landmarks.evaluation.trajectory import Indices, Trajectory
 from mcap_landmarks.geometry.angles import yaw_from_quaternion
 from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.maps.map_markers import landmarks_from_markers
 from mcap_landmarks.maps.scene_objects import usable
 from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.columns import Table
 from mcap_landmarks.messages.layout import layout_of
+from mcap_landmarks.messages.markers import MarkerArray
 from mcap_landmarks.messages.match import LandmarkMatch, Status
 from mcap_landmarks.messages.parts import PLANAR
 from mcap_landmarks.messages.poses import PoseStamped, PoseWithCovarianceStamped
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.typestore import definition_in
+from mcap_landmarks.moments import moment
 from mcap_landmarks.stage import Channel
 
 Flags = NDArray[np.bool_]
 _APART_M = 0.5
 """Objects farther apart than this are two, whatever their ids and classes; nearer ones need a closer look."""
-ONCE = (MAP, TRUTH_OBJECTS)
+ONCE = (MAP, MAP_MARKERS, TRUTH_OBJECTS)
 """Channels of which the first message counts."""
 
 
@@ -65,11 +68,12 @@ class Collected:
             self.add(channel, schema, logged_ns[:half], messages[:half])
             self.add(channel, schema, logged_ns[half:], messages[half:])
             return
+        if channel in ONCE:
+            self._once(channel, messages[0])
+            return
         stamps = table.columns["header.stamp"].values[:, 0]
         times = np.where(stamps == 0, np.array(logged_ns, dtype=np.int64), stamps)
-        if channel in ONCE:
-            self.once.setdefault(channel.topic, decode(SceneObjects, messages[0]))
-        elif channel.message is PoseStamped:
+        if channel.message is PoseStamped:
             self._poses(channel.topic, times, table)
         elif channel.message is PoseWithCovarianceStamped:
             full = table.columns["pose.covariance"].values.reshape(-1, 6, 6)
@@ -86,20 +90,33 @@ class Collected:
         made = self.poses.get((MAP_POSE if continuous else POSE).topic, [])
         statuses = {status.name.lower(): self.statuses[status] for status in Status} if matches else None
         trajectory = _trajectory(made, [] if continuous else self.covariances)
-        landmarks = self.once.get(MAP.topic)
-        return RunResult(trajectory, matches or self.scenes, self.eligible, statuses, landmarks, self.seen, continuous)
+        landmarks, drawn = self.once.get(MAP.topic), self.once.get(MAP_MARKERS.topic)
+        bundles = matches or self.scenes
+        return RunResult(trajectory, bundles, self.eligible, statuses, landmarks, self.seen, continuous, drawn)
 
     def reference(self) -> Reference:
         """The truth that the recording holds."""
         truth = self.poses.get(TRUTH_POSE.topic)
         return Reference(_trajectory(truth, []) if truth else None, self.once.get(TRUTH_OBJECTS.topic))
 
+    def _once(self, channel: Channel[Message], data: bytes) -> None:
+        try:
+            message = decode(channel.message, data)
+        except MessageError:  # such as markers of another kind than ours
+            self.broken[channel.topic] += 1
+            return
+        scene = landmarks_from_markers(message) if isinstance(message, MarkerArray) else message
+        if isinstance(scene, SceneObjects):
+            self.once.setdefault(channel.topic, scene)
+
     def _poses(self, topic: str, times: Indices, table: Table) -> None:
         position, orientation = (table.columns[f"pose.{part}"].values for part in ("position", "orientation"))
         poses = np.column_stack([position[:, :2], yaw_from_quaternion(orientation)])
         bad = ~np.isfinite(poses).all(axis=1)
         if bad.any():
-            raise RecordingError(f"{self.name}: {topic} at {times[bad][0]} is not finite; repair or cut the log")
+            raise RecordingError(
+                f"{self.name}: {topic} at {moment(int(times[bad][0]))} is not finite; repair or cut the log"
+            )
         if topic == POSE.topic:
             poses[~orientation.any(axis=1), 2] = np.nan  # a position without heading
         self.poses.setdefault(topic, []).append((times, poses))

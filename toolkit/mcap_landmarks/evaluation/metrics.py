@@ -32,7 +32,8 @@ class RunResult:
     """What a run gave: poses, bundles in all and by status, the map it used or made; None where it has none.
 
     eligible: how many of the bundles hold two distinct objects or more. seen: ids of the matched landmarks by time.
-    continuous: whether the poses are one path rather than each of its own.
+    continuous: whether the poses are one path rather than each of its own. drawn: the landmarks as markers show them,
+    where a map was made of the log: they have no covariances, and tentative ones are not among them.
     """
 
     trajectory: Trajectory
@@ -42,6 +43,7 @@ class RunResult:
     landmarks: SceneObjects | None = None
     seen: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     continuous: bool = False
+    drawn: SceneObjects | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,6 +4,7 @@ import numpy as np
 
 from mcap_landmarks.channels import (
     MAP,
+    MAP_MARKERS,
     MAP_POSE,
     MATCH,
     NO_SCENES,
@@ -29,7 +30,7 @@ from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.stage import Channel, Connection
 
-_RESULTS = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, MAP, MAP_POSE)
+_RESULTS = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, MAP, MAP_MARKERS, MAP_POSE)
 _TRUTH = (TRUTH_POSE, TRUTH_OBJECTS)
 _AT_ONCE = 2000
 """So many messages become columns together; memory stays small."""

@@ -74,8 +74,9 @@ def gather(paths: Sequence[Location], *, aligned: bool, progress: Progress | Non
 def _with(
     drawing: Drawing, name: str, result: RunResult, reference: Reference, groups: tuple[Group, ...], *, aligned: bool
 ) -> Drawing:
-    if drawing.landmarks is None and result.landmarks is not None:
-        drawing = replace(drawing, landmarks=result.landmarks, groups=groups)
+    landmarks = result.drawn if result.landmarks is None else result.landmarks
+    if drawing.landmarks is None and landmarks is not None:
+        drawing = replace(drawing, landmarks=landmarks, groups=groups)
     if drawing.objects is None:
         drawing = replace(drawing, objects=reference.objects)
     if not len(result.trajectory) and reference.trajectory is None:
@@ -126,3 +127,20 @@ def breaks(trajectory: Trajectory, gap_ns: int = 2 * 10**9) -> Array:
     if len(after) >= len(trajectory) - 1:
         return np.zeros((0, 2))
     return np.insert(trajectory.poses[:, :2], after, np.nan, axis=0)
+
+
+def follows(trajectory: Trajectory) -> bool:
+    """Whether its poses follow one another, so that the first is a start and the last an end."""
+    return len(breaks(trajectory)) > 0
+
+
+def waypoints(trajectory: Trajectory, most: int) -> Array:
+    """At most so many poses (K, 3) with a heading, evenly along the way; none of a path without headings."""
+    known = trajectory.poses[np.isfinite(trajectory.poses).all(axis=1)]
+    if not len(known):
+        return known
+    steps = np.linalg.norm(np.diff(known[:, :2], axis=0), axis=1)
+    way = np.concatenate([[0.0], np.cumsum(steps)])
+    rows = np.searchsorted(way, (np.arange(most) + 0.5) / most * way[-1])
+    chosen: Array = known[np.unique(rows)]
+    return chosen

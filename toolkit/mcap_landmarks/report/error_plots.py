@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.report.drawing import Drawing, Run
@@ -39,7 +40,7 @@ def errors_figure(drawing: Drawing, title: str = "") -> Figure:
     """Box plots of the errors along x and along y, one box per run (figures 5.4 and 5.5); metres.
 
     Boxes hold the middle half, whiskers reach to the last error within 1.5 times its width; the number above a box is
-    the median of the errors' size.
+    that of its line, the median.
 
     Raises:
         RecordingError: no position has a truth.
@@ -61,11 +62,13 @@ def errors_figure(drawing: Drawing, title: str = "") -> Figure:
             medianprops={"color": _COMPUTED, "linewidth": 1.4},
             flierprops={"marker": "o", "markersize": 3, "markeredgecolor": _LINK},
         )
-        for median, run_errors in zip(boxes["medians"], errors, strict=True):
+        for median in boxes["medians"]:
             x, y = median.get_xydata()[0]
-            text = f"{np.median(np.abs(run_errors)):.3f} m"
-            axes.annotate(text, (x, y), (0, 3), textcoords="offset points", ha="center", fontsize=7, color="#374151")
+            place = (float(x), float(y))
+            text = f"{x:+.4f} m"
+            axes.annotate(text, place, (0, 3), textcoords="offset points", ha="center", fontsize=7, color="#374151")
         axes.axvline(0.0, color=_LINK, linewidth=0.8, zorder=0)
+        axes.xaxis.set_major_locator(MaxNLocator(5))  # more labels of millimetres run into each other
         axes.set_xlabel(f"error in {name} [m]")
         _finish(axes, title if axis == 0 else "")
     panels[0].invert_yaxis()

@@ -15,6 +15,7 @@ from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.report.cloud_picture import draw_cuboids, draw_from_above, draw_lost, draw_velocities
 from mcap_landmarks.report.explain_reading import Picture, SensorData
+from mcap_landmarks.report.explain_words import beside_the_scan
 from mcap_landmarks.report.plots import draw_ellipses
 
 _GREY, _OBJECT, _CLUSTER, _BOX = "#9CA3AF", "#D55E00", "#0072B2", "#FACC15"
@@ -76,8 +77,8 @@ def _draw_image(axes: Axes, situation: Situation, picture: Picture, name: str) -
     if found is None:
         axes.set_title("image, without detections", loc="left", fontsize=9)
         return
-    apart_ms = (found.stamp_ns - situation.stamp_ns) / 1e6
-    axes.set_title(f"{name or found.frame_id}, {apart_ms:+.0f} ms beside the scan", loc="left", fontsize=9)
+    when = beside_the_scan(found.stamp_ns, situation.stamp_ns)
+    axes.set_title(f"{name or found.frame_id}, {when}", loc="left", fontsize=9)
     for (x1, y1, x2, y2), options in zip(found.boxes_xyxy.tolist(), found.hypotheses, strict=True):
         axes.add_patch(Rectangle((x1, y1), x2 - x1, y2 - y1, fill=False, edgecolor=_BOX, linewidth=1.4))
         if options:

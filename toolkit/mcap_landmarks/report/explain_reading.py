@@ -43,6 +43,7 @@ from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.velocities import SceneVelocities
+from mcap_landmarks.moments import moment
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.report.box_outcomes import LostBox, lost_boxes
 from mcap_landmarks.stage import Channel, Config, Connection, RawMessage
@@ -153,8 +154,9 @@ def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
         bundles = found.messages[MATCH] or found.messages[SCENE_OBJECTS]
         if not bundles:
             raise RecordingError(
-                f"{path}: no bundle with scene objects within 3 s of {at_ns}; the log goes from {recording.start_ns} "
-                f"to {recording.end_ns}, and localize writes what is explained"
+                f"{path}: no bundle with scene objects within 3 s of {moment(at_ns)}; the log goes from "
+                f"{moment(recording.start_ns or 0)} to {moment(recording.end_ns or 0)}, and localize writes what is "
+                "explained"
             )
         stamp_ns = min((time_ns for time_ns, _ in bundles), key=lambda time_ns: abs(time_ns - at_ns))
         return _situation(recording, found, stamp_ns), _view(recording, found, stamp_ns)

@@ -22,13 +22,19 @@ def sensed_lines(situation: Situation, view: SensorData) -> list[str]:
     return lines
 
 
+def beside_the_scan(stamp_ns: int, scan_ns: int) -> str:
+    """When something was, as seen from the scan."""
+    apart_ms = round((stamp_ns - scan_ns) / 1e6)
+    return f"{abs(apart_ms)} ms {'before' if apart_ms < 0 else 'after'} the scan" if apart_ms else "at the scan's time"
+
+
 def _detected(situation: Situation) -> str:
     told = []
     for found in situation.detections:
         names = ", ".join(f"{name} {score:.2f}" for options in found.hypotheses for name, score in options[:1])
-        apart_ms = (found.stamp_ns - situation.stamp_ns) / 1e6
+        when = beside_the_scan(found.stamp_ns, situation.stamp_ns)
         image = f"image of {found.frame_id}" if len(situation.detections) > 1 else "image"
-        told.append(f"{names or 'no object'}, in the {image} {apart_ms:+.0f} ms beside the scan")
+        told.append(f"{names or 'no object'}, in the {image} {when}")
     return "; ".join(told) or "nothing that the log tells"
 
 

@@ -16,7 +16,7 @@ from mcap_landmarks.evaluation.pose_metrics import FALSE_M
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.model import Group
-from mcap_landmarks.report.drawing import Drawing, Run, breaks
+from mcap_landmarks.report.drawing import Drawing, Run, breaks, follows, waypoints
 
 FORMATS = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None}}
 """Formats, and the metadata of each that would tell the clock or the program's version."""
@@ -27,6 +27,8 @@ _TRUTH, _GROUP, _ERROR = "#8A8F98", "#6B7280", "#DC2626"
 _RUNS = ("#111827", "#1D4ED8", "#B45309", "#047857", "#7E22CE")
 _RADII_95 = 2.4477
 """An ellipse of so many sigmas holds 95 % of a normal distribution of the plane."""
+_ARROWS = 14
+"""So many headings along a path can be told from each other at the size of a page."""
 _MOST_LABELS = 60
 """Of more landmarks the labels would cover each other at the size of a page."""
 
@@ -205,6 +207,7 @@ def _draw_estimate(axes: Axes, run: Run, colour: str, *, named: bool) -> None:
     if not len(run.estimate):
         return
     name = f"{run.name}: " if named else ""
+    _draw_way(axes, run, colour)
     if run.continuous:
         path, label = breaks(run.estimate), f"{name}estimated path"
         starts = [0, *(np.flatnonzero(np.isnan(path[:, 0])) + 1).tolist()] if len(path) else []
@@ -226,3 +229,38 @@ def _draw_estimate(axes: Axes, run: Run, colour: str, *, named: bool) -> None:
             label=f"{name}over {FALSE_M:g} m off",
             zorder=7,
         )
+
+
+def _draw_way(axes: Axes, run: Run, colour: str) -> None:
+    """Where a run starts, ends and heads; positions that do not follow one another have neither start nor end."""
+    poses = waypoints(run.estimate, _ARROWS)
+    if len(poses):
+        x, y, heading = poses.T
+        axes.quiver(
+            x,
+            y,
+            np.cos(heading),
+            np.sin(heading),
+            color=colour,
+            edgecolor="white",
+            linewidth=0.6,
+            pivot="mid",
+            headwidth=4.0,
+            units="inches",
+            scale=4.5,
+            width=0.03,
+            zorder=6,
+        )
+        axes.plot([], [], marker="$\\rightarrow$", color=colour, markersize=11, linestyle="", label="heading")
+    if follows(run.estimate):  # the ring of the start goes around the end of a closed loop
+        axes.plot(
+            *run.estimate.poses[0, :2],
+            "o",
+            markerfacecolor="none",
+            markeredgecolor=colour,
+            markeredgewidth=1.4,
+            markersize=10,
+            label="start",
+            zorder=8,
+        )
+        axes.plot(*run.estimate.poses[-1, :2], "s", color=colour, markersize=5, label="end", zorder=8)

@@ -11,6 +11,7 @@ from mcap_landmarks.channels import MATCH, POSE, POSE_COVARIANCE
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.match import LandmarkMatch
+from mcap_landmarks.moments import moment
 from mcap_landmarks.progress import Watch, unwatched
 from mcap_landmarks.recording.time_association import WINDOW_NS
 from mcap_landmarks.runs.bundles import Reading
@@ -72,8 +73,8 @@ def _localized(session: Session, before: list[str], time_ns: int, watch: Watch) 
             if answer.stamp_ns > time_ns + WINDOW_NS:
                 break
     if nearest is None or abs(nearest.stamp_ns - time_ns) > WINDOW_NS:
-        known = "there is none at all" if nearest is None else f"the nearest is at {nearest.stamp_ns}"
-        raise UsageError(f"{session.log.path}: no bundle within 2 s of {time_ns}; {known}")
+        known = "there is none at all" if nearest is None else f"the nearest is at {moment(nearest.stamp_ns)}"
+        raise UsageError(f"{session.log.path}: no bundle within 2 s of {moment(time_ns)}; {known}")
     return nearest, log.reading
 
 

@@ -4,6 +4,7 @@ from mcap_landmarks.errors import UsageError
 from mcap_landmarks.inspection.topic_roles import choose
 from mcap_landmarks.manifest import narrowed
 from mcap_landmarks.messages.codec import Message
+from mcap_landmarks.moments import moment
 from mcap_landmarks.recording.layered_log import LayeredLog, own_layer, result_layers
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.runs.bundles import Span
@@ -46,5 +47,6 @@ def _check_span(recording: Recording, span: Span) -> None:
         return
     if (span.start_ns or 0) > last or (span.end_ns is not None and span.end_ns <= first):
         raise UsageError(
-            f"{recording.path}: no message lies between --start and --end; the log lasts from {first} to {last} ns"
+            f"{recording.path}: no message lies between --start and --end; the log lasts from {moment(first)} to "
+            f"{moment(last)}"
         )
