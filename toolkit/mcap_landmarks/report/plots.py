@@ -27,7 +27,7 @@ _TRUTH, _GROUP, _ERROR = "#8A8F98", "#6B7280", "#DC2626"
 _RUNS = ("#111827", "#1D4ED8", "#B45309", "#047857", "#7E22CE")
 _RADII_95 = 2.4477
 """An ellipse of so many sigmas holds 95 % of a normal distribution of the plane."""
-_ARROWS = 14
+_ARROWS = 12
 """So many headings along a path can be told from each other at the size of a page."""
 _MOST_LABELS = 60
 """Of more landmarks the labels would cover each other at the size of a page."""
@@ -247,8 +247,8 @@ def _draw_way(axes: Axes, run: Run, colour: str) -> None:
             pivot="mid",
             headwidth=4.0,
             units="inches",
-            scale=4.5,
-            width=0.03,
+            scale=7.0,
+            width=0.022,
             zorder=6,
         )
         axes.plot([], [], marker="$\\rightarrow$", color=colour, markersize=11, linestyle="", label="heading")

@@ -1,0 +1,192 @@
+"""The poses of one topic of a recording, whoever wrote it: which topic that is, and its trajectory in the plane."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mcap_landmarks.channels import MAP_POSE, POSE, POSE_COVARIANCE, TRUTH_POSE
+from mcap_landmarks.errors import MessageError, RecordingError, UsageError
+from mcap_landmarks.evaluation.trajectory import Indices, Trajectory
+from mcap_landmarks.geometry.angles import yaw_from_quaternion
+from mcap_landmarks.geometry.frames import plain
+from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.locations import Location
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.parts import PLANAR
+from mcap_landmarks.messages.poses import Odometry, PoseStamped, PoseWithCovarianceStamped
+from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.progress import Progress
+from mcap_landmarks.recording.reader import Recording, open_recording
+
+_Message = PoseStamped | PoseWithCovarianceStamped | Odometry
+_TYPES: dict[str, type[_Message]] = {
+    message.ROS_TYPE: message for message in (PoseStamped, PoseWithCovarianceStamped, Odometry)
+}
+_OURS = (POSE_COVARIANCE.topic, POSE.topic, MAP_POSE.topic, TRUTH_POSE.topic)
+"""Our pose channels, the one first that is taken before the others."""
+_FLAT_M, _FLAT = 1e-3, 1e-3
+"""Less height, and less of a quaternion's x and y, is no more than the noise of a robot on a floor."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseTrack:
+    """The trajectory of a topic in a frame; the heading of a pose that has none is NaN.
+
+    `others` are the other topics that have poses, `notes` say what was left out, `losses` what could not be read.
+    """
+
+    topic: str
+    frame: str
+    trajectory: Trajectory
+    others: tuple[str, ...]
+    notes: tuple[str, ...]
+    losses: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class _Rows:
+    """Poses as they come: time, position, quaternion and planar covariance, which is NaN where unknown."""
+
+    time_ns: list[int] = field(default_factory=list)
+    positions: list[Array] = field(default_factory=list)
+    quaternions: list[Array] = field(default_factory=list)
+    covariances: list[Array] = field(default_factory=list)
+    frames: Counter[str] = field(default_factory=Counter)
+    broken: int = 0
+
+    def add(self, time_ns: int, frame: str, parts: tuple[Array, Array], covariance: Array | None = None) -> None:
+        """Take the next pose: position (3,) and quaternion (4,)."""
+        self.time_ns.append(time_ns)
+        self.positions.append(parts[0])
+        self.quaternions.append(parts[1])
+        known = covariance is not None and covariance.any()
+        self.covariances.append(covariance if covariance is not None and known else np.full((3, 3), np.nan))
+        self.frames[plain(frame)] += 1
+
+
+def read_poses(
+    path: Location, topic: str | None = None, child: str | None = None, progress: Progress | None = None
+) -> PoseTrack:
+    """The poses of a topic, by default of the one that says most of where the robot was.
+
+    That is what localize found, then what map found, then the truth, then odometry, then the poses of others.
+    Transforms are read where their topic is named, those to the frame `child`, or to the only one.
+
+    Raises:
+        RecordingError: the log cannot be read, or has no poses.
+        UsageError: several topics or frames fit, or the named one does not.
+    """
+    with open_recording(path) as recording:
+        ranks = _candidates(recording)
+        chosen = topic or _default(path, ranks)
+        rows = _Rows()
+        if chosen in ranks:
+            _read(recording, chosen, rows, progress)
+        else:
+            rows = _transforms(recording, chosen, child, progress)
+        losses = list(recording.losses)
+        if rows.broken:
+            losses.insert(0, f"{chosen}: {rows.broken} messages could not be decoded")
+        trajectory, notes = _trajectory(rows)
+    if not len(trajectory):
+        raise RecordingError(f"{path}: {chosen} has no pose that can be used; {'; '.join([*notes, *losses])}")
+    others = tuple(other for other in ranks if other != chosen)
+    return PoseTrack(chosen, rows.frames.most_common(1)[0][0], trajectory, others, tuple(notes), tuple(losses))
+
+
+def _candidates(recording: Recording) -> dict[str, int]:
+    """The topics with poses, the best first, with their ranks: 0 is the best."""
+    counts, kinds = Counter[str](), dict[str, str]()
+    for entry in recording.channels:
+        if entry.connection.message_type in _TYPES and entry.count:
+            counts[entry.connection.topic] += entry.count
+            kinds[entry.connection.topic] = entry.connection.message_type
+    ours = list(_OURS)
+    if counts[POSE.topic] > counts[POSE_COVARIANCE.topic]:  # some positions have neither heading nor covariance
+        ours[:2] = reversed(ours[:2])
+    of_others = {Odometry.ROS_TYPE: len(ours)}
+    ranks = {
+        topic: ours.index(topic) if topic in ours else of_others.get(kind, len(ours) + 1)
+        for topic, kind in kinds.items()
+    }
+    return dict(sorted(ranks.items(), key=lambda item: (item[1], item[0])))
+
+
+def _default(path: Location, ranks: dict[str, int]) -> str:
+    best = [topic for topic, rank in ranks.items() if rank == min(ranks.values())]
+    if not best:
+        raise RecordingError(
+            f"{path}: has no poses ({', '.join(_TYPES)}); run localize or map -o on it, or name a topic of transforms "
+            "with --topic"
+        )
+    if len(best) > 1:
+        raise UsageError(f"{path}: {' and '.join(best)} have poses; choose with --topic")
+    return best[0]
+
+
+def _read(recording: Recording, topic: str, rows: _Rows, progress: Progress | None) -> None:
+    wanted = [one for one in recording.connections(topic) if one.message_type in _TYPES]
+    for raw in recording.messages(wanted, progress=progress):
+        try:
+            message = decode(_TYPES[raw.connection.message_type], raw.data)
+        except MessageError:
+            rows.broken += 1
+            continue
+        spread = None if isinstance(message, PoseStamped) else _covariance(message)
+        parts = message.position_m, message.orientation_xyzw
+        rows.add(message.stamp_ns or raw.log_time_ns, message.frame_id, parts, spread)
+
+
+def _covariance(message: PoseWithCovarianceStamped | Odometry) -> Array:
+    full = message.covariance if isinstance(message, PoseWithCovarianceStamped) else message.pose_covariance
+    return full[PLANAR]
+
+
+def _transforms(recording: Recording, topic: str, child: str | None, progress: Progress | None) -> _Rows:
+    """The transforms of a topic between two frames."""
+    wanted = [one for one in recording.connections(topic) if one.message_type == TFMessage.ROS_TYPE]
+    if not wanted:
+        known = ", ".join([*_TYPES, TFMessage.ROS_TYPE])
+        found = ", ".join(one.message_type for one in recording.connections(topic)) or "not in the log"
+        raise UsageError(f"{recording.path}: {topic} is {found}; --topic takes {known}")
+    moves, broken = dict[tuple[str, str], _Rows](), 0
+    for raw in recording.messages(wanted, progress=progress):
+        try:
+            transforms = decode(TFMessage, raw.data).transforms
+        except MessageError:
+            broken += 1
+            continue
+        for one in transforms:
+            mine = moves.setdefault((plain(one.frame_id), plain(one.child_frame_id)), _Rows())
+            mine.add(one.stamp_ns or raw.log_time_ns, one.frame_id, (one.translation_m, one.rotation_xyzw))
+    fitting = [pair for pair in moves if child is None or pair[1] == plain(child)]
+    if len(fitting) != 1:
+        several = " and ".join(f"{above} -> {below}" for above, below in sorted(fitting or moves)) or "nothing"
+        raise UsageError(f"{recording.path}: {topic} has {several}; choose with --child FRAME")
+    moves[fitting[0]].broken = broken
+    return moves[fitting[0]]
+
+
+def _trajectory(rows: _Rows) -> tuple[Trajectory, list[str]]:
+    """The trajectory of what can be used, and in words what cannot."""
+    count = len(rows.time_ns)
+    times: Indices = np.array(rows.time_ns, dtype=np.int64)
+    positions, quaternions = np.array(rows.positions).reshape(-1, 3), np.array(rows.quaternions).reshape(-1, 4)
+    covariances = np.array(rows.covariances).reshape(-1, 3, 3)
+    known = quaternions.any(axis=1)
+    headings = np.where(known, yaw_from_quaternion(quaternions), np.nan)
+    finite = np.isfinite(positions[:, :2]).all(axis=1) & np.isfinite(quaternions).all(axis=1)
+    poses = np.column_stack([positions[:, :2], headings])[finite]
+    trajectory = Trajectory.of(times[finite], poses, covariances[finite])
+    notes = []
+    if lost := count - int(finite.sum()):
+        notes.append(f"{lost} poses are not finite; they are left out")
+    if twice := int(finite.sum()) - len(trajectory):
+        notes.append(f"{twice} poses have the time of another one; the first of each time stays")
+    heights = np.abs(np.nan_to_num(positions[:, 2])).max(initial=0.0)
+    if heights > _FLAT_M or np.abs(np.nan_to_num(quaternions[:, :2])).max(initial=0.0) > _FLAT:
+        notes.append(f"poses are given in the plane: heights (up to {heights:.3g} m) and tilts are left out")
+    if len(rows.frames) > 1:
+        notes.append(f"the poses are in several frames: {', '.join(sorted(rows.frames))}")
+    return trajectory, notes
