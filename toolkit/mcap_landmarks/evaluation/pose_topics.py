@@ -1,6 +1,7 @@
 """The poses of one topic of a recording, whoever wrote it: which topic that is, and its trajectory in the plane."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -160,11 +161,17 @@ def _transforms(recording: Recording, topic: str, child: str | None, progress: P
         for one in transforms:
             mine = moves.setdefault((plain(one.frame_id), plain(one.child_frame_id)), _Rows())
             mine.add(one.stamp_ns or raw.log_time_ns, one.frame_id, (one.translation_m, one.rotation_xyzw))
-    fitting = [pair for pair in moves if child is None or pair[1] == plain(child)]
+    found = _moves_to(child, moves, f"{recording.path}: {topic}")
+    found.broken = broken
+    return found
+
+
+def _moves_to(child: str | None, moves: Mapping[tuple[str, str], _Rows], place: str) -> _Rows:
+    """The transforms to a frame, or the only ones that there are, of those by parent and child."""
+    fitting = sorted(pair for pair in moves if child is None or pair[1] == plain(child))
     if len(fitting) != 1:
-        several = " and ".join(f"{above} -> {below}" for above, below in sorted(fitting or moves)) or "nothing"
-        raise UsageError(f"{recording.path}: {topic} has {several}; choose with --child FRAME")
-    moves[fitting[0]].broken = broken
+        several = " and ".join(f"{above} -> {below}" for above, below in fitting or sorted(moves)) or "no transforms"
+        raise UsageError(f"{place} has {several}; choose with --child FRAME")
     return moves[fitting[0]]
 
 

@@ -155,11 +155,14 @@ def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
         if not bundles:
             raise RecordingError(
                 f"{path}: no bundle with scene objects within 3 s of {moment(at_ns)}; the log goes from "
-                f"{moment(recording.start_ns or 0)} to {moment(recording.end_ns or 0)}, and localize writes what is "
-                "explained"
+                f"{_span(recording)}, and localize writes what is explained"
             )
         stamp_ns = min((time_ns for time_ns, _ in bundles), key=lambda time_ns: abs(time_ns - at_ns))
         return _situation(recording, found, stamp_ns), _view(recording, found, stamp_ns)
+
+
+def _span(recording: Recording) -> str:
+    return f"{moment(recording.start_ns or 0)} to {moment(recording.end_ns or 0)}"
 
 
 def _first_infos(recording: Recording, channels: Mapping[Connection, Channel[Message]]) -> Iterator[RawMessage]:
