@@ -161,9 +161,9 @@ def _transforms(recording: Recording, topic: str, child: str | None, progress: P
         for one in transforms:
             mine = moves.setdefault((plain(one.frame_id), plain(one.child_frame_id)), _Rows())
             mine.add(one.stamp_ns or raw.log_time_ns, one.frame_id, (one.translation_m, one.rotation_xyzw))
-    found = _moves_to(child, moves, f"{recording.path}: {topic}")
-    found.broken = broken
-    return found
+    rows = _moves_to(child, moves, f"{recording.path}: {topic}")
+    rows.broken = broken
+    return rows
 
 
 def _moves_to(child: str | None, moves: Mapping[tuple[str, str], _Rows], place: str) -> _Rows:
