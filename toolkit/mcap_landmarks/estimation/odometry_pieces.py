@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.geometry.se2 import Array, between, compose, exp, log
 
 Ints = NDArray[np.int64]
@@ -29,6 +30,8 @@ _BRIDGED_S = 0.2
 """Over a leap in a shorter time the velocity tells how the robot went on."""
 _BRIDGE_MPS2, _BRIDGE_RADPS2 = 2.0, 2.0
 """So much the velocity may change meanwhile, as small robots speed up."""
+_COURSE, _DRIVEN_M = 100, 0.2
+"""The side to which the robot drives is looked at over so many messages, if it drives so far in them."""
 _LONE = 3
 """Fewer messages somewhere else are outliers, and no robot."""
 _TOGETHER = 10
@@ -199,13 +202,35 @@ def _bridged(times_s: Array, poses: Array, threads: list[Ints], dropped: Counter
         if before is not None:
             gap_s = float(times_s[rows[0]] - times_s[before[-1]])
             if 0 < gap_s <= _BRIDGED_S:
+                own = _as_headed(moved[before], poses[rows])
                 ahead = _velocity(times_s, moved, before.tolist())
-                after = _velocity(times_s, poses, rows[:5].tolist())
+                after = _velocity(times_s[rows], own, list(range(min(len(rows), 5))))
                 start = compose(moved[before[-1]], exp((ahead + after) / 2 * gap_s))
-                moved[rows] = compose(start, between(poses[rows[0]], poses[rows]))
+                moved[rows] = compose(start, between(own[0], own))
                 slack[rows[0]] = np.array([_BRIDGE_MPS2, _BRIDGE_RADPS2]) * gap_s**2 / 2
                 bridged += 1
             else:
                 number += 1
         piece[rows], before = number, rows
     return Pieces(piece, moved, slack, bridged, +dropped)
+
+
+def _as_headed(before: Array, poses: Array) -> Array:
+    """Poses (N, 3) after a leap with headings that fit their positions.
+
+    Where only the heading leaps, as that of a compass does, the robot seems to drive on to another side of itself.
+    """
+    courses = _course(before[-_COURSE:]), _course(poses[:_COURSE])
+    if courses[0] is None or courses[1] is None:
+        return poses
+    turned = float(wrap(poses[0, 2] - before[-1, 2]))
+    aside = float(wrap(courses[1] - courses[0]))
+    if abs(turned) < _NOISE_RAD or abs(wrap(aside + turned)) > abs(turned) / 2:
+        return poses
+    return np.column_stack([poses[:, :2], wrap(poses[:, 2] - turned)])
+
+
+def _course(poses: Array) -> float | None:
+    """To which side of itself a robot drives, in rad from straight ahead; None where it hardly drives."""
+    way = between(poses[:-1], poses[1:])[:, :2].sum(axis=0)
+    return float(np.arctan2(way[1], way[0])) if np.hypot(*way) > _DRIVEN_M else None
