@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY, SCAN, SCENE_OBJECTS, TF_STATIC
-from mcap_landmarks.inspection.checks import Finding
+from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.inspection.info import describe
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.progress import unwatched

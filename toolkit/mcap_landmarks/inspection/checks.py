@@ -1,6 +1,6 @@
 """What will go wrong with a log, and what to do about it: told before hours are spent."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from mcap_landmarks.channels import RESULTS
 from mcap_landmarks.geometry.frames import REMEDY
 from mcap_landmarks.inspection.cameras import ALL, info_topic
+from mcap_landmarks.inspection.clock_checks import clock_findings
 from mcap_landmarks.inspection.cloud_checks import check_clouds
 from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.inspection.odometry_checks import check_frames, check_odometry, check_stray_stamps
@@ -47,6 +48,7 @@ def check(found: Survey) -> list[Finding]:
         _gaps,
         _stamps,
         check_stray_stamps,
+        lambda found: clock_findings(found.clocks),
         _clocks,
         _partners,
         _frames,
@@ -119,14 +121,13 @@ def _stamps(found: Survey) -> Iterator[Finding]:
 
 
 def _clocks(found: Survey) -> Iterator[Finding]:
+    """What log times say of clocks; nothing of those of which it is known by what sensors saw."""
+    settled = {topic for one in found.clocks if one.offset is not None for topic in (one.odometry, one.sensor)}
     delays = _delays(found)
-    clocks = (sensor.topic for role in _CLOCKS for sensor in found.of(role))
-    reference = next((topic for topic in clocks if topic in delays), None)
-    if reference is None:
-        return
+    reference = _reference(found, delays)
     for topic, delay_ns in delays.items():
-        apart_ns = delay_ns - delays[reference]
-        if abs(apart_ns) > _CLOCKS_APART_NS:
+        apart_ns = delay_ns - delays[reference] if reference else 0.0
+        if abs(apart_ns) > _CLOCKS_APART_NS and not {topic, reference} <= settled:
             level = "problem" if abs(apart_ns) > WINDOW_NS else "warning"
             text = f"against log times its stamps are {_span(apart_ns)} those of {reference}"
             remedy = (
@@ -135,17 +136,28 @@ def _clocks(found: Survey) -> Iterator[Finding]:
             yield Finding(level, "clock", topic, text, remedy)
 
 
+def _reference(found: Survey, delays: Mapping[str, float]) -> str:
+    """The topic, of some, whose clock the others are held against; empty where there is none."""
+    clocks = (sensor.topic for role in _CLOCKS for sensor in found.of(role))
+    return next((topic for topic in clocks if topic in delays), "")
+
+
 def _delays(found: Survey) -> dict[str, float]:
-    """The delays in nanoseconds of the sensors' topics that tell one; our results have the stamps of others."""
-    sensed = [sensor for sensor in found.sensors if not sensor.topic.startswith(RESULTS)]
+    """The delays in nanoseconds of the sensors' topics that tell one.
+
+    Our results have the stamps of others, and what is known to be off is told already.
+    """
+    wrong = {one.blamed for one in found.clocks if one.is_harmful}
+    sensed = [one for one in found.sensors if not one.topic.startswith(RESULTS) and one.topic not in wrong]
     return {sensor.topic: delay for sensor in sensed if (delay := _delay_ns(sensor)) is not None}
 
 
 def _delay_ns(sensor: Sensor) -> float | None:
     """How much later than they were whole messages are logged, most often; None where that says nothing of clocks.
 
-    What comes after a clock was set back does not count. Whether a scan's stamp is that of its first or of its last beam is not told; what explains more counts. Camera
-    information holds until the next comes: it is often latched, or carried over from before a cut.
+    What comes after a clock was set back does not count. Whether a scan's stamp is that of its first or of its last
+    beam is not told; what explains more counts. Camera information holds until the next comes: it is often latched, or
+    carried over from before a cut.
     """
     log_ns, stamp_ns = sensor.times
     known = (stamp_ns != 0) & ~strays(log_ns, stamp_ns)

@@ -9,6 +9,7 @@ from mcap_landmarks.channels import MAP_POSE, MATCH, POSE, TRUTH_DETECTIONS, TRU
 from mcap_landmarks.config import Settings
 from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.inspection.checks import check
+from mcap_landmarks.inspection.clock_reading import clocks_of
 from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.inspection.format_checks import check_formats
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog, open_logs
@@ -112,6 +113,7 @@ def _checked(log: OpenLog, info: LogInfo, watch: Watch) -> LogInfo:
     """What is known of a log when all of it was read: what is damaged, what will cost results, and which verbs fail."""
     with watch(f"check {log.name}", log.size_bytes) as progress:
         found = survey(log, info.roles, progress)
+        found.clocks = clocks_of(log, info.roles)
     network, about_it = _network(log) if found.of("image") else (None, [])
     formats = [one for part in log.parts if isinstance(part, McapLog) for one in check_formats(part.recorded)]
     findings = (*formats, *about_it, *check(found))

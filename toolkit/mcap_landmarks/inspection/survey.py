@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mcap_landmarks.channels import ODOMETRY
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.geometry.frames import plain
+from mcap_landmarks.inspection.clock_checks import Comparison
 from mcap_landmarks.inspection.log_frames import LogFrames, frames_from
 from mcap_landmarks.inspection.odometry_examination import OdometryMessages
 from mcap_landmarks.inspection.open_logs import OpenLog
@@ -84,7 +85,7 @@ class CloudSamples:
 
 @dataclass(slots=True)
 class Survey:
-    """What a log's sensors gave: the first transform of each parent and child, and odometry by topic."""
+    """What sensors gave: the first transform of each parent and child, odometry by topic, what they say of clocks."""
 
     sensors: list[Sensor] = field(default_factory=list)
     transforms: dict[tuple[str, str], Transform] = field(default_factory=dict)
@@ -93,6 +94,7 @@ class Survey:
     clouds: dict[str, CloudSamples] = field(default_factory=dict)
     uncalibrated: set[str] = field(default_factory=set)
     unreadable: Counter[str] = field(default_factory=Counter)
+    clocks: list[Comparison] = field(default_factory=list)
 
     def of(self, role: str) -> list[Sensor]:
         """The sensors of a role."""

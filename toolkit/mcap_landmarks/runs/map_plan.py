@@ -9,6 +9,7 @@ from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import StageRecord
 from mcap_landmarks.runs.bundles import inputs_of
+from mcap_landmarks.runs.clock_refusal import refuse_clocks
 from mcap_landmarks.runs.needed_stages import missing_stages
 from mcap_landmarks.runs.plan import Request, Step, choice_options, inputs_of_stage, is_result, plan, record_of
 from mcap_landmarks.runs.session import open_session
@@ -60,7 +61,7 @@ def plan_map(task: MapTask, parts: Path) -> MapPlan:
     """The plan of a map; `parts` is where an unfinished run may have left results.
 
     Raises:
-        RecordingError: a log cannot be read, or has nothing to make a map of.
+        RecordingError: a log cannot be read, has nothing to make a map of, or clocks that would spoil one.
         UsageError: a recording is named twice, or a setting or file is wrong.
     """
     config = load(STAGE.name, task.requests[0].settings)
@@ -78,6 +79,7 @@ def _plan_log(place: str, config: Config, request: Request, task: MapTask, parts
         sensed = [channel for channel in STAGE.required if not is_result(channel, choice)]
         inputs_of(log.without_results(), sensed, sensed, choice)  # before hours are spent on the other stages
         steps = tuple(plan(session.request, log, missing_stages(STAGE, log, request.use)))
+        refuse_clocks(session, steps)
         inputs, options = inputs_of_stage(STAGE, log, steps), choice_options(choice, STAGE.reads)
         record = record_of(STAGE, config, task.files, inputs, options)
         return LogPlan(place, session.request, log.recording.fingerprint(), steps, record)

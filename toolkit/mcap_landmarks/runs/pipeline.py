@@ -9,6 +9,7 @@ from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, to_read
 from mcap_landmarks.manifest import Outcome
 from mcap_landmarks.progress import Watch, unwatched
+from mcap_landmarks.runs.clock_refusal import clock_notes
 from mcap_landmarks.runs.needed_stages import in_order, missing_stages
 from mcap_landmarks.runs.output_writer import write_output
 from mcap_landmarks.runs.plan import Request, plan
@@ -55,9 +56,11 @@ def run_stages(
             use = (*session.request.use, *names)
             before = [other for name in names for other in missing_stages(find_stage(name), session.log, use)]
             names = in_order([*before, *names])
-        runs = [session.work(step, watch) for step in plan(session.request, session.log, names)]
+        steps = plan(session.request, session.log, names)
+        clocks = clock_notes(session, steps)
+        runs = [session.work(step, watch) for step in steps]
         notes, losses = write_output(session, output, verb, [session.log.recording.fingerprint()], watch)
-        return LogRun(request.recording, output, tuple(runs), *told(runs, notes, losses))
+        return LogRun(request.recording, output, tuple(runs), *told(runs, [*notes, *clocks], losses))
 
 
 def told(

@@ -1,0 +1,94 @@
+"""Which odometry and sensors of a log are compared, and how they are read."""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from functools import partial
+
+from mcap_landmarks.channels import ODOMETRY
+from mcap_landmarks.errors import MessageError
+from mcap_landmarks.inspection.clock_checks import Comparison, Sight, compare
+from mcap_landmarks.inspection.open_logs import OpenLog
+from mcap_landmarks.inspection.sensor_mounts import mount_of
+from mcap_landmarks.inspection.topic_roles import ROLES
+from mcap_landmarks.inspection.turn_samples import Read
+from mcap_landmarks.locations import Location
+from mcap_landmarks.manifest import STAGE
+from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.header import frame_in
+from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.sources import merge
+from mcap_landmarks.stage import Connection, RawMessage
+
+_MOST_TRANSFORMS = 300
+"""So many messages of /tf are decoded: where sensors are shows soon (`survey`)."""
+_SEEING = ("scan", "scene_objects")
+_COMPARED = (LaserScan.ROS_TYPE, SceneObjects.ROS_TYPE)
+
+
+def clocks_of(log: OpenLog, roles: Mapping[str, Sequence[str]]) -> list[Comparison]:
+    """The comparisons of every topic of odometry with every one of scans and recorded scene objects."""
+    if log.start_ns is None or log.end_ns is None:
+        return []
+    connections = [entry.connection for part in log.parts for entry in part.channels if entry.count]
+    sensors = [
+        (role, one) for role in _SEEING for one in _on(roles.get(role, ()), connections) if STAGE not in one.metadata
+    ]
+    found: list[Comparison] = []
+    for topic in roles.get(ROLES[ODOMETRY].name, ()):
+        odometry = _on([topic], connections)
+        found += clocks_between(partial(_read, log), (log.start_ns, log.end_ns + 1), odometry, sensors, connections)
+    return found
+
+
+def _on(topics: Collection[str], connections: Iterable[Connection]) -> list[Connection]:
+    return [connection for connection in connections if connection.topic in topics]
+
+
+def clocks_between(
+    read: Read,
+    span: tuple[int, int],
+    odometry: Sequence[Connection],
+    sensors: Iterable[tuple[str, Connection]],
+    connections: Iterable[Connection],
+    extrinsics: Location | None = None,
+) -> list[Comparison]:
+    """The comparisons of one odometry with sensors (role, connection) that see the robot turn.
+
+    Of `connections` those with transforms tell how sensors are mounted; `extrinsics` is a file that does.
+    """
+    seeing = [(role, one) for role, one in sensors if one.message_type in _COMPARED]
+    if not odometry or not seeing:
+        return []
+    transforms = list(_transforms(read, connections, span))
+    sights = []
+    for role, connection in seeing:
+        mount = mount_of(_frame(read, connection, span), transforms, extrinsics)
+        if mount is not None:
+            sights.append(Sight(role, connection, mount))
+    return compare(read, span, odometry, sights)
+
+
+def _read(log: OpenLog, connections: Collection[Connection], start_ns: int, end_ns: int) -> Iterator[RawMessage]:
+    pieces = [(part.start_ns or 0, partial(part.messages, connections, start_ns, end_ns)) for part in log.parts]
+    return merge(pieces)
+
+
+def _frame(read: Read, connection: Connection, span: tuple[int, int]) -> str:
+    try:
+        return next((frame_in(raw.data) for raw in read([connection], *span)), "")
+    except MessageError:
+        return ""
+
+
+def _transforms(read: Read, connections: Iterable[Connection], span: tuple[int, int]) -> Iterator[Transform]:
+    for connection in connections:
+        if connection.message_type != TFMessage.ROS_TYPE:
+            continue
+        for count, raw in enumerate(read([connection], *span)):
+            if count >= _MOST_TRANSFORMS:
+                break
+            try:
+                yield from decode(TFMessage, raw.data).transforms
+            except MessageError:
+                continue
