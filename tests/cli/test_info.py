@@ -186,6 +186,7 @@ def test_findings_are_told_with_what_to_do(tmp_path: Path, capsys: pytest.Captur
         ("problem", "frames"),
         ("problem", "frames"),
         ("warning", "frames"),
+        ("warning", "scan"),
     ]
     assert run(log, "--check") == PARTIAL
     said = capsys.readouterr().out

@@ -11,6 +11,8 @@ from mcap_landmarks.geometry.camera import CameraModel
 K = np.array([[530.5, 0.0, 320.0], [0.0, 528.0, 240.0], [0.0, 0.0, 1.0]])
 PINHOLE = np.array([-0.28, 0.09, 0.001, -0.0007, -0.012])
 RATIONAL = np.array([0.4, -0.2, 0.0004, 0.0002, 0.01, 0.75, -0.15, 0.02])
+PRISM = np.array([*PINHOLE, 0.0, 0.0, 0.0, 0.003, -0.0005, -0.002, 0.0004])
+TILTED = np.array([*PRISM, 0.03, -0.05])
 FISHEYE = np.array([-0.04, 0.003, -0.002, 0.0004])
 SIZE = (640, 480)
 
@@ -21,7 +23,14 @@ def points(spread: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("name", "distortion"), [("plumb_bob", PINHOLE), ("rational_polynomial", RATIONAL), ("", np.zeros(0))]
+    ("name", "distortion"),
+    [
+        ("plumb_bob", PINHOLE),
+        ("rational_polynomial", RATIONAL),
+        ("rational_polynomial", PRISM),
+        ("rational_polynomial", TILTED),
+        ("", np.zeros(0)),
+    ],
 )
 def test_pixels_are_opencvs(name: str, distortion: np.ndarray) -> None:
     ahead = points(1.0)
@@ -37,10 +46,12 @@ def test_a_fisheyes_pixels_are_opencvs() -> None:
     np.testing.assert_allclose(camera.project(around), expected, atol=1e-8)
 
 
-@given(st.floats(0, 640), st.floats(0, 480), st.sampled_from(["plumb_bob", "rational_polynomial", "equidistant"]))
+@given(
+    st.floats(0, 640), st.floats(0, 480), st.sampled_from(["plumb_bob", "rational_polynomial", "tilted", "equidistant"])
+)
 def test_rays_go_through_their_pixels(u: float, v: float, name: str) -> None:
-    distortion = {"plumb_bob": PINHOLE, "rational_polynomial": RATIONAL, "equidistant": FISHEYE}[name]
-    camera = CameraModel.of(name, SIZE, K, distortion)
+    known = {"plumb_bob": PINHOLE, "rational_polynomial": RATIONAL, "tilted": TILTED, "equidistant": FISHEYE}
+    camera = CameraModel.of("rational_polynomial" if name == "tilted" else name, SIZE, K, known[name])
     ray = camera.rays([u, v])
     assert np.linalg.norm(ray) == pytest.approx(1.0)
     np.testing.assert_allclose(camera.project(7 * ray), [u, v], atol=1e-6)

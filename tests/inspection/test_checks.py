@@ -69,6 +69,10 @@ def without(first: int, last: int) -> Change:
     return lambda stamped: None if first * STEP_NS <= stamped.log_time_ns < last * STEP_NS else stamped
 
 
+def changed(stamped: Stamped, **values: object) -> Stamped:
+    return Stamped(stamped.channel, stamped.log_time_ns, dataclasses.replace(stamped.message, **values))
+
+
 def uncalibrated(stamped: Stamped) -> Stamped:
     return Stamped(stamped.channel, 1, dataclasses.replace(stamped.message, intrinsics=np.zeros((3, 3))))
 
@@ -115,10 +119,13 @@ PLANTED: dict[str, tuple[Change, set[tuple[str, str, str]]]] = {
         of(TF_STATIC, lambda _: None),
         {("frames", "/scan", "nothing says where the LiDAR"), ("frames", "/camera/camera_info", "from camera to")},
     ),
-    "no odometry": (of(ODOMETRY, lambda _: None), {("frames", "", "there is no odometry")}),
+    "no odometry": (
+        of(ODOMETRY, lambda _: None),
+        {("frames", "", "there is no odometry"), ("scan", "/scan", "a scan takes 0.1 s and cannot be de-skewed")},
+    ),
     "no camera_info": (of(CAMERA_INFO, lambda _: None), {("camera", "/camera/image_raw/compressed", "no camera_info")}),
     "camera_info from before a cut": (of(CAMERA_INFO, lambda s: late(s, 7 * SECOND)), set()),
-    "no calibration": (of(CAMERA_INFO, uncalibrated), {("camera", "/camera/camera_info", "not calibrated")}),
+    "no calibration": (of(CAMERA_INFO, uncalibrated), {("camera", "/camera/camera_info", "no focal length")}),
     "a second camera": (
         lambda stamped: stamped,
         {("camera", "", "images are on 2 topics"), ("camera", "/rear/image_raw", "no camera_info goes with")},
@@ -126,6 +133,23 @@ PLANTED: dict[str, tuple[Change, set[tuple[str, str, str]]]] = {
     "blind beams": (
         of(SCAN, lambda s: blind(s, slice(45, 60))),
         {("beams", "/scan", "15 of 180 beams never returned anything in 40 scans: 90 to 118 deg")},
+    ),
+    "scans in millimetres": (
+        of(SCAN, lambda s: changed(s, ranges_m=np.full(180, 2000.0, np.float32))),
+        {("scan", "/scan", "40 of 40 scans in millimetres")},
+    ),
+    "scans without limits": (of(SCAN, lambda s: changed(s, range_min_m=0.0, range_max_m=0.0)), set()),
+    "scans that cannot be read": (
+        of(SCAN, lambda s: changed(s, angle_increment_rad=0.01)),
+        {("scan", "/scan", "40 of 40 scans cannot be read: a scan's angle_increment contradicts its limits")},
+    ),
+    "images of another size": (
+        of(CAMERA_INFO, lambda s: changed(s, width_px=640, height_px=480)),
+        {("camera", "/camera/camera_info", "is of 640 x 480 pixels, but the images are of 64 x 48")},
+    ),
+    "binning": (
+        of(CAMERA_INFO, lambda s: changed(s, width_px=128, height_px=96, binning=(2, 2))),
+        set(),
     ),
     "a blind LiDAR": (of(SCAN, lambda s: blind(s, slice(0, 180))), {("beams", "/scan", "no beam returned anything")}),
 }
@@ -162,7 +186,7 @@ def test_problems_come_first(tmp_path: Path) -> None:
     found = findings(
         tmp_path, lambda s: of(SCAN, lambda t: blind(t, slice(0, 180)))(s) if s.channel != ODOMETRY else None
     )
-    assert [finding.level for finding in found] == ["problem", "warning"]
+    assert [finding.level for finding in found] == ["problem", "warning", "warning"]
 
 
 def test_a_message_that_does_not_fit_its_type_is_counted(tmp_path: Path) -> None:

@@ -7,13 +7,13 @@ from mcap_landmarks.messages.annotations import ImageAnnotations, Label, Outline
 from mcap_landmarks.messages.boxes import Boxes
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.detections import Detections
-from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
+from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image, Region
 from mcap_landmarks.messages.markers import Marker, MarkerArray, MarkerShape
 from mcap_landmarks.messages.match import Condition, LandmarkMatch, Status
 from mcap_landmarks.messages.numbers import UInt8
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.poses import Odometry, Path, PoseStamped, PoseWithCovarianceStamped
-from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage, Transform
@@ -118,13 +118,15 @@ match = st.builds(
     st.integers(0, 99),
     st.lists(st.builds(Condition, text, number, number, st.booleans()), max_size=3).map(tuple),
 )
+laser_scan = st.builds(LaserScan, stamp, text, *[single] * 7, scan_ranges, scan_ranges)
 MESSAGES = st.one_of(
     pose_stamped,
     st.builds(PoseWithCovarianceStamped, stamp, text, vector(3), vector(4), vector(6, 6)),
     st.builds(Path, stamp, text, st.lists(pose_stamped, max_size=3).map(tuple)),
     st.builds(Odometry, stamp, text, text, vector(3), vector(4), vector(6, 6), vector(3), vector(3), vector(6, 6)),
     st.builds(TFMessage, st.lists(transform, max_size=3).map(tuple)),
-    st.builds(LaserScan, stamp, text, *[single] * 7, scan_ranges, scan_ranges),
+    laser_scan,
+    st.builds(MultiEchoLaserScan, laser_scan),
     st.builds(PointCloud2, stamp, text, cloud_points),
     clustered_cloud(),
     scene_velocities(),
@@ -143,6 +145,8 @@ MESSAGES = st.one_of(
         vector(3, 3),
         vector(3, 3),
         vector(3, 4),
+        st.tuples(st.integers(0, 9), st.integers(0, 9)),
+        st.builds(Region, *[st.integers(0, 9)] * 4, st.booleans()),
     ),
     scene_objects(),
     scan_objects(),

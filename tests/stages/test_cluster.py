@@ -42,7 +42,7 @@ def scan(
     empty = np.zeros(0, np.float32)
     values = np.asarray(distances, dtype=np.float32)
     increment_s = turn_s / len(values)
-    return LaserScan(stamp_ns, frame, 0.0, step * 359, step, increment_s, 0.2, 0.12, 15.0, values, empty)
+    return LaserScan(stamp_ns, frame, 0.0, step * 359, step, increment_s, turn_s, 0.12, 15.0, values, empty)
 
 
 def bundle(message: Message, *transforms: Transform, second: Message | None = None) -> Bundle:
@@ -234,13 +234,6 @@ def test_limits_of_range_and_view() -> None:
 def test_a_scan_of_nothing_is_a_message_of_nothing() -> None:
     (found,) = results([bundle(scan(np.full(360, np.inf)), mounting())])
     assert len(found) == 0
-
-
-@pytest.mark.parametrize("step", [0.0, np.nan])
-def test_a_scan_without_directions_is_lost(step: float) -> None:
-    (made,) = process([bundle(scan(ranges(THINGS), step=step), mounting())], ClusterConfig(), {})
-    assert isinstance(made, Omission)
-    assert made.lost
 
 
 def test_nobody_guesses_where_the_lidar_is(tmp_path: Path) -> None:

@@ -5,6 +5,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.fusion.camera_info import in_image
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.camera import CameraModel
 from mcap_landmarks.geometry.frames import apply
@@ -63,14 +65,20 @@ class SeenImage(NamedTuple):
     view: CameraView
 
 
-def camera_from_info(info: CameraInfo, *, rectified: bool) -> CameraModel:
-    """The camera of a CameraInfo, or of the images that were `rectified` with it.
+def camera_from_info(info: CameraInfo, *, rectified: bool | None) -> CameraModel:
+    """The camera of a CameraInfo, or of the images that were `rectified` with it; None: as it says itself.
 
     Raises:
-        RecordingError: see `CameraModel.of`.
+        RecordingError: see `CameraModel.of` and `in_image`.
     """
+    info = in_image(info)
     width, height = info.width_px or 2 * info.intrinsics[0, 2], info.height_px or 2 * info.intrinsics[1, 2]
     size = (int(width), int(height))
-    if rectified:
+    if info.of_rectified if rectified is None else rectified:
+        if not info.projection[0, 0] > 0:
+            raise RecordingError(
+                "the CameraInfo has no P, which counts for rectified images; calibrate the camera, or set "
+                "fuse.rectified=false if they are not rectified"
+            )
         return CameraModel.of("", size, info.projection[:, :3], np.zeros(0))
     return CameraModel.of(info.distortion_model, size, info.intrinsics, info.distortion)

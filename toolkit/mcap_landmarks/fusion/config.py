@@ -27,7 +27,8 @@ class FuseConfig:
     how evidence adds up along a track: its odds of being of a class at first (`prior_odds_alone` without odometry,
     where every scan is on its own), the most that one detection multiplies them by, the share of that for every other
     class, what an image without it leaves of them if it would be `min_height_px` high there, and the most that they
-    get. `rectified` images have no distortion and the projection matrix of CameraInfo. The thesis (Algorithm 3) sorts
+    get. `rectified` images have no distortion and the projection matrix of CameraInfo; unset, the name of their topic
+    tells (`image_rect`, `image_rect_color`). The thesis (Algorithm 3) sorts
     boxes about `image_centre_px`.
     """
 
@@ -50,7 +51,7 @@ class FuseConfig:
     miss_odds: Factor = 0.2
     max_odds: Positive = 1e3
     min_height_px: Positive = 20.0
-    rectified: bool = False
+    rectified: bool | None = None
     camera_sigma_m: Positive = 3.0
     image_centre_px: float = 320.5
 

@@ -14,15 +14,18 @@ _SLOPE_OVER = 1e-6
 """Numerical slopes are taken over so much of the image plane: the cube root of a double's precision is near it."""
 _WIDEST = 10.0
 """The tangent of 84 degrees from the axis: no pinhole camera sees farther out."""
-_PINHOLE, _FISHEYE = ("", "plumb_bob", "rational_polynomial"), ("equidistant", "fisheye")
+_PINHOLE, _FISHEYE = {"": 14, "plumb_bob": 8, "rational_polynomial": 14}, {"equidistant": 4, "fisheye": 4}
+"""Models by ROS's names, and how many coefficients each may have."""
+_PINHOLE_COUNT, _FISHEYE_COUNT = 14, 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraModel:
     """A camera that looks along z, x to the right and y down.
 
-    `intrinsics` is K (3, 3). `distortion` (n,) has k1, k2, p1, p2, k3, then k4 to k6 (rational); of a fisheye
-    (`equidistant`) k1 to k4 of the polynomial in the angle from the axis (Kannala and Brandt 2006).
+    `intrinsics` is K (3, 3). `distortion` (n,) has k1, k2, p1, p2, k3, then k4 to k6 (rational), s1 to s4 (thin prism)
+    and tau_x, tau_y (tilted sensor) as OpenCV's calibration has them; of a fisheye (`equidistant`) k1 to k4 of the
+    polynomial in the angle from the axis (Kannala and Brandt 2006).
     """
 
     size_px: tuple[int, int]
@@ -41,13 +44,18 @@ class CameraModel:
         """
         if not (np.isfinite(intrinsics).all() and intrinsics[0, 0] > 0 and intrinsics[1, 1] > 0):
             raise RecordingError("the CameraInfo has no focal length; calibrate the camera and record its CameraInfo")
+        if not np.isfinite(distortion).all():
+            raise RecordingError("the CameraInfo's distortion is not finite; calibrate the camera and record it again")
         if not distortion.any():
-            return cls(size_px, intrinsics, np.zeros(8), False)
+            return cls(size_px, intrinsics, np.zeros(_PINHOLE_COUNT), False)
         if name not in (*_PINHOLE, *_FISHEYE):
             known = ", ".join(repr(model) for model in (*_PINHOLE, *_FISHEYE) if model)
             raise RecordingError(f"the CameraInfo's distortion model is {name!r}; give one of {known}")
         is_fisheye = name in _FISHEYE
-        camera = cls(size_px, intrinsics, _coefficients(name, distortion, 4 if is_fisheye else 8), is_fisheye)
+        coefficients = np.zeros(_FISHEYE_COUNT if is_fisheye else _PINHOLE_COUNT)
+        given = _given(name, distortion)
+        coefficients[: len(given)] = given
+        camera = cls(size_px, intrinsics, coefficients, is_fisheye)
         return replace(camera, limit=camera._fold())
 
     def _fold(self) -> float:
@@ -113,17 +121,18 @@ class CameraModel:
     def _distorted(self, plane: Array) -> Array:
         if not self.distortion.any():
             return plane
-        k1, k2, p1, p2, k3, k4, k5, k6 = self.distortion
+        k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tilt_x, tilt_y = self.distortion
         x, y = plane[..., 0], plane[..., 1]
         s = x * x + y * y
         radial = (1 + s * (k1 + s * (k2 + s * k3))) / (1 + s * (k4 + s * (k5 + s * k6)))
-        return np.stack(
+        bent = np.stack(
             [
-                x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x),
-                y * radial + p1 * (s + 2 * y * y) + 2 * p2 * x * y,
+                x * radial + 2 * p1 * x * y + p2 * (s + 2 * x * x) + s * (s1 + s * s2),
+                y * radial + p1 * (s + 2 * y * y) + 2 * p2 * x * y + s * (s3 + s * s4),
             ],
             axis=-1,
         )
+        return _tilted(bent, tilt_x, tilt_y) if tilt_x or tilt_y else bent
 
     def _undistorted(self, plane: Array) -> Array:
         """The point whose `_distorted` this is, by Newton's method with numerical slopes."""
@@ -142,10 +151,20 @@ class CameraModel:
         return point
 
 
-def _coefficients(name: str, distortion: Array, count: int) -> Array:
-    """The model's coefficients (count,), zero where fewer were given; more may be given if these are zero."""
+def _tilted(plane: Array, about_x_rad: float, about_y_rad: float) -> Array:
+    """Points (..., 2) of the image plane on a sensor that is tilted about x and then y (Louhichi et al. 2007)."""
+    (sin_x, sin_y), (cos_x, cos_y) = np.sin([about_x_rad, about_y_rad]), np.cos([about_x_rad, about_y_rad])
+    about_x = np.array([[1, 0, 0], [0, cos_x, sin_x], [0, -sin_x, cos_x]])
+    about_y = np.array([[cos_y, 0, -sin_y], [0, 1, 0], [sin_y, 0, cos_y]])
+    turned = about_y @ about_x
+    seen = np.array([[turned[2, 2], 0, -turned[0, 2]], [0, turned[2, 2], -turned[1, 2]], [0, 0, 1]]) @ turned
+    points = np.concatenate([plane, np.ones_like(plane[..., :1])], axis=-1) @ seen.T
+    return np.asarray(points[..., :2] / points[..., 2:])
+
+
+def _given(name: str, distortion: Array) -> Array:
+    """The model's coefficients; more than it has may be given if these are zero."""
+    count = {**_PINHOLE, **_FISHEYE}[name]
     if distortion[count:].any():
         raise RecordingError(f"the CameraInfo has {len(distortion)} coefficients of {name}; give {count}")
-    whole = np.zeros(count)
-    whole[: len(distortion)] = distortion[:count]
-    return whole
+    return distortion[:count]

@@ -104,13 +104,18 @@ def _same_optics(info: CameraInfo, other: CameraInfo) -> bool:
     )
 
 
+def without_transport(image: str) -> str:
+    """The topic of images without what image_transport adds for another form of them."""
+    base, _, last = image.rpartition("/")
+    return base if last in _TRANSPORTS else image
+
+
 def info_topic(image: str, frame: str, infos: Mapping[str, str]) -> str | None:
     """The topic of the CameraInfo of images on a topic and in a frame; `infos` are frames by topic.
 
     By ROS's convention it is called `camera_info` and lies beside the images; else it is the only one in their frame.
     """
-    base, _, last = image.rpartition("/")
-    base = base if last in _TRANSPORTS else image
+    base = without_transport(image)
     beside = [topic for topic in (f"{base.rpartition('/')[0]}/camera_info", f"{base}/camera_info") if topic in infos]
     same = [topic for topic in infos if frame and infos[topic] == frame]
     both = [topic for topic in beside if topic in same]
@@ -169,9 +174,9 @@ def _depth_topics(recording: Readable, named: Named) -> set[str]:
     found = set()
     for topic, connection in named:
         form = ""
-        for raw in recording.messages([connection]) if connection.message_type in _IMAGES else ():
+        for raw in recording.messages([connection]) if connection.message_type in IMAGES else ():
             try:
-                message = decode(_IMAGES[connection.message_type], raw.data)
+                message = decode(IMAGES[connection.message_type], raw.data)
             except MessageError:
                 continue
             form = message.format if isinstance(message, CompressedImage) else message.encoding
@@ -181,9 +186,10 @@ def _depth_topics(recording: Readable, named: Named) -> set[str]:
     return found
 
 
-_IMAGES: Mapping[str, type[Image] | type[CompressedImage]] = {
+IMAGES: Mapping[str, type[Image] | type[CompressedImage]] = {
     message.ROS_TYPE: message for message in (CompressedImage, Image)
 }
+"""The messages that are images, by type."""
 
 
 def _check_frames(recording: Readable, used: Sequence[Camera]) -> None:

@@ -7,11 +7,13 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.channels import RESULTS
 from mcap_landmarks.geometry.frames import REMEDY
+from mcap_landmarks.inspection.camera_checks import check_camera_infos
 from mcap_landmarks.inspection.cameras import ALL, info_topic
 from mcap_landmarks.inspection.clock_checks import clock_findings
 from mcap_landmarks.inspection.cloud_checks import check_clouds
 from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.inspection.odometry_checks import check_frames, check_odometry, check_stray_stamps
+from mcap_landmarks.inspection.scan_checks import check_scans
 from mcap_landmarks.inspection.survey import Returns, Sensor, Survey, connected
 from mcap_landmarks.recording.clocks import set_back, strays
 from mcap_landmarks.recording.time_association import BESIDE_NS, WINDOW_NS
@@ -56,6 +58,8 @@ def check(found: Survey) -> list[Finding]:
         _odometry,
         check_odometry,
         _cameras,
+        check_camera_infos,
+        check_scans,
         _beams,
         check_clouds,
     )
@@ -253,9 +257,6 @@ def _cameras(found: Survey) -> Iterator[Finding]:
             f"choose with --image TOPIC, several times for several cameras, or --image {ALL} for all with camera_info"
         )
         yield Finding("warning", "camera", "", text, remedy)
-    for topic in sorted(found.uncalibrated):
-        text = "the camera is not calibrated: its focal length is zero"
-        yield Finding("problem", "camera", topic, text, "calibrate it, and set its camera_info in the driver")
 
 
 def _beams(found: Survey) -> Iterator[Finding]:

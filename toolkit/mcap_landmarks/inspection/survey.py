@@ -12,21 +12,25 @@ from numpy.typing import NDArray
 from mcap_landmarks.channels import ODOMETRY
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.geometry.frames import plain
+from mcap_landmarks.inspection.cameras import IMAGES
 from mcap_landmarks.inspection.clock_checks import Comparison
 from mcap_landmarks.inspection.log_frames import LogFrames, frames_from
 from mcap_landmarks.inspection.odometry_examination import OdometryMessages
 from mcap_landmarks.inspection.open_logs import OpenLog
+from mcap_landmarks.inspection.scan_readings import ScanReadings
 from mcap_landmarks.inspection.topic_roles import message_type
+from mcap_landmarks.lidar.beams import echoes
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.header import frame_in, stamp_in
 from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.points import PointCloud2
-from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.odometry_track import odometry_from
 from mcap_landmarks.sources import merge
 from mcap_landmarks.stage import Connection, RawMessage
+from mcap_landmarks.vision.image_size import image_size
 
 SENSORS = ("image", "camera_info", "scan", "point_cloud", "odometry", "scene_objects")
 """The roles that are looked at."""
@@ -36,6 +40,9 @@ _CLOUDS_SPARED = 10
 """Clouds are large: of so many that would be decoded one is."""
 _MOST_TRANSFORMS = 300
 """So many of a topic are decoded, spread over the log or its first: which beams and frames there are shows soon."""
+_SCANS: Mapping[str, type[LaserScan] | type[MultiEchoLaserScan]] = {
+    message.ROS_TYPE: message for message in (LaserScan, MultiEchoLaserScan)
+}
 
 
 @dataclass(slots=True)
@@ -85,14 +92,19 @@ class CloudSamples:
 
 @dataclass(slots=True)
 class Survey:
-    """What sensors gave: the first transform of each parent and child, odometry by topic, what they say of clocks."""
+    """What a log's sensors gave: the first transform of each parent and child, odometry by topic, what clocks say.
+
+    `infos` and `image_px` are the first CameraInfo and the size of the first image of each topic.
+    """
 
     sensors: list[Sensor] = field(default_factory=list)
     transforms: dict[tuple[str, str], Transform] = field(default_factory=dict)
     odometry: dict[str, OdometryMessages] = field(default_factory=dict)
     returns: dict[str, Returns] = field(default_factory=dict)
     clouds: dict[str, CloudSamples] = field(default_factory=dict)
-    uncalibrated: set[str] = field(default_factory=set)
+    readings: dict[str, ScanReadings] = field(default_factory=dict)
+    infos: dict[str, CameraInfo] = field(default_factory=dict)
+    image_px: dict[str, tuple[int, int]] = field(default_factory=dict)
     unreadable: Counter[str] = field(default_factory=Counter)
     clocks: list[Comparison] = field(default_factory=list)
 
@@ -156,19 +168,29 @@ def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
     stamp_ns = _first_stamp_ns(raw.data) if ros_type == TFMessage.ROS_TYPE else stamp_in(raw.data)
     sensor.log_ns.append(raw.log_time_ns)
     sensor.stamp_ns.append(stamp_ns)
-    if ros_type == LaserScan.ROS_TYPE and number % stride == 0:
-        _look_at_scan(decode(LaserScan, raw.data), sensor, found.returns)
+    if ros_type in _SCANS and number % stride == 0:
+        scan = found.readings.setdefault(sensor.topic, ScanReadings()).read(decode(_SCANS[ros_type], raw.data))
+        if scan is not None:
+            _look_at_scan(scan, sensor, found.returns)
     if sensor.role == "point_cloud" and number % (stride * _CLOUDS_SPARED) == 0:
         _look_at_cloud(decode(PointCloud2, raw.data), found.clouds.setdefault(sensor.topic, CloudSamples()))
     if sensor.role == "odometry":
         odometry = odometry_from(decode(message_type(ODOMETRY, raw.connection), raw.data))
         if odometry is not None:
             found.odometry.setdefault(sensor.topic, OdometryMessages()).take(raw.log_time_ns, odometry)
-    if number or ros_type == TFMessage.ROS_TYPE:
-        return
+    if not number and ros_type != TFMessage.ROS_TYPE:
+        _take_first(raw, sensor, found)
+
+
+def _take_first(raw: RawMessage, sensor: Sensor, found: Survey) -> None:
+    ros_type = raw.connection.message_type
     sensor.frame = plain(frame_in(raw.data))
-    if ros_type == CameraInfo.ROS_TYPE and not decode(CameraInfo, raw.data).intrinsics[0, 0] > 0:
-        found.uncalibrated.add(sensor.topic)
+    if ros_type == CameraInfo.ROS_TYPE:
+        found.infos[sensor.topic] = decode(CameraInfo, raw.data)
+    elif ros_type in IMAGES:
+        size_px = image_size(decode(IMAGES[ros_type], raw.data))
+        if size_px is not None:
+            found.image_px[sensor.topic] = size_px
 
 
 def _first_stamp_ns(data: bytes | memoryview) -> int:
@@ -192,8 +214,7 @@ def _look_at_scan(scan: LaserScan, sensor: Sensor, returns: dict[str, Returns]) 
     if known is None or len(known.counts) != len(ranges):  # a driver that changes its mind starts anew
         zeros = np.zeros(len(ranges), dtype=np.int64)
         known = returns[sensor.topic] = Returns(scan.angle_min_rad, scan.angle_increment_rad, zeros)
-    with np.errstate(invalid="ignore"):
-        known.counts += np.isfinite(ranges) & (ranges >= scan.range_min_m) & (ranges > 0) & (ranges < scan.range_max_m)
+    known.counts += np.isfinite(echoes(ranges, scan.range_min_m, scan.range_max_m))
     known.scans += 1
 
 

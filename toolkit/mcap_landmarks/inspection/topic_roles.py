@@ -1,6 +1,7 @@
 """Which topics of a recording play which role: found by message type, or chosen by the user."""
 
 import contextlib
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
@@ -12,7 +13,7 @@ from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.poses import Odometry, PoseStamped
-from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage
 from mcap_landmarks.stage import Channel, Connection, Readable
@@ -22,7 +23,8 @@ from mcap_landmarks.stage import Channel, Connection, Readable
 class Role:
     """What a channel is to the stages, the option that chooses its topic, and the messages that fit.
 
-    `others` are messages that do as well, of a topic that the user chooses or that has the name `usual`.
+    `others` are messages that do as well, of a topic that the user chooses or that has the name `usual`; `instead` are
+    those of them that are taken by themselves where there are none of `messages`.
     """
 
     name: str
@@ -30,6 +32,7 @@ class Role:
     messages: tuple[type[Message], ...]
     others: tuple[type[Message], ...] = ()
     usual: str = ""
+    instead: tuple[type[Message], ...] = ()
 
     @property
     def types(self) -> tuple[str, ...]:
@@ -43,8 +46,10 @@ _OF_CAMERAS = (channels.CAMERA_IMAGE, channels.CAMERA_INFO)
 ROLES: Mapping[Channel[Message], Role] = {
     channels.CAMERA_IMAGE: Role("image", "--image", (CompressedImage, Image)),
     channels.CAMERA_INFO: Role("camera_info", "--remap", (CameraInfo,)),
-    channels.SCAN: Role("scan", "--scan", (LaserScan,), (PointCloud2,)),
-    channels.SECOND_SCAN: Role("second_scan", "--scan", (), (LaserScan, PointCloud2)),
+    channels.SCAN: Role(
+        "scan", "--scan", (LaserScan,), (PointCloud2, MultiEchoLaserScan), instead=(MultiEchoLaserScan,)
+    ),
+    channels.SECOND_SCAN: Role("second_scan", "--scan", (), (LaserScan, PointCloud2, MultiEchoLaserScan)),
     channels.ODOMETRY: Role("odometry", "--odom", (Odometry,), (TFMessage, PoseStamped), channels.TF.topic),
     channels.SCENE_OBJECTS: Role("scene_objects", "--remap", (SceneObjects,)),
 }
@@ -121,6 +126,7 @@ def parse_offsets(texts: Sequence[str]) -> dict[str, int]:
 def topics_for(role: Role, present: Collection[tuple[str, str]]) -> list[str]:
     """Topics that fit a role, of (topic, message type); scene objects on our own topic leave the others out."""
     fitting = _of_types(present, [message.ROS_TYPE for message in role.messages])
+    fitting = fitting or _of_types(present, [message.ROS_TYPE for message in role.instead])
     if not fitting and role.usual in _of_types(present, role.types):
         fitting = [role.usual]
     if role.name == "scene_objects":
@@ -135,8 +141,11 @@ def _of_types(present: Collection[tuple[str, str]], types: Collection[str]) -> l
 
 
 def could_be(present: Iterable[tuple[str, str]], channel: Channel[Message]) -> str:
-    """Topics, of (topic, message type), that a user could choose as a channel that none is by itself; empty if none."""
-    role = ROLES.get(channel)
+    """Topics, of (topic, message type), that a user could choose as a channel that none is by itself; empty if none.
+
+    Where scans are missing, topics of other types that sound like scans are named, too.
+    """
+    role, present = ROLES.get(channel), list(present)
     if role is None:
         return ""
     others = {message.ROS_TYPE for message in role.others}
@@ -144,7 +153,29 @@ def could_be(present: Iterable[tuple[str, str]], channel: Channel[Message]) -> s
     recorded = {topic for topic in topics if not topic.startswith((channels.RESULTS, channels.TRUTH))}
     fitting = sorted(topic for topic in recorded if not topic.endswith("_static"))
     how = "--scan-from TOPIC" if channel == channels.SCAN else f"{role.option} TOPIC"
-    return f"{' or '.join(fitting)} could be it, choose with {how}" if fitting else ""
+    hints = [f"{' or '.join(fitting)} could be it, choose with {how}"] if fitting else []
+    return "; ".join([*hints, *(_no_scans(present) if channel == channels.SCAN else [])])
+
+
+_LIKE_SCANS = re.compile("scan|laser|lidar|echo|sonar|range|points|cloud|packets", re.IGNORECASE)
+"""What topics and types are called that carry what a LiDAR or the like measures."""
+_SINGLE_RANGE = "sensor_msgs/msg/Range"
+
+
+def _no_scans(present: Iterable[tuple[str, str]]) -> list[str]:
+    """Topics that sound like scans and cannot be read as such, with their types."""
+    role = ROLES[channels.SCAN]
+    said = []
+    for topic, ros_type in sorted(set(present)):
+        if ros_type in role.types or topic.startswith((channels.RESULTS, channels.TRUTH)):
+            continue
+        if ros_type == _SINGLE_RANGE:
+            said.append(f"{topic} is {ros_type}: single ranges are not used")
+        elif _LIKE_SCANS.search(f"{topic} {ros_type.rpartition('/')[2]}"):
+            said.append(
+                f"{topic} is {ros_type}, which is read as no scan; have its driver record LaserScan or PointCloud2"
+            )
+    return said
 
 
 def choose(recording: Readable, channel: Channel[Message], choice: Choice) -> tuple[Connection, ...]:

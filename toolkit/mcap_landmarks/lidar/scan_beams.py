@@ -22,8 +22,8 @@ def beams_of(
     base_from_lidar: Array,
     base_from_then: BaseFromThen | None,
     config: ClusterConfig,
-) -> Beams | None:
-    """The beams of one LiDAR mounted at `base_from_lidar` (4, 4), None if they have no known directions.
+) -> Beams:
+    """The beams of one LiDAR mounted at `base_from_lidar` (4, 4); scans are as the standard has them (`scan_repair`).
 
     `stamp_ns` stands in where the message has no stamp. Without `base_from_then` the base stood still meanwhile.
 
@@ -32,8 +32,6 @@ def beams_of(
     """
     if isinstance(message, PointCloud2):
         return _slice(message, stamp_ns, base_from_lidar, base_from_then, config)
-    if not _makes_sense(message):
-        return None
     places = np.arange(len(message.ranges_m), dtype=np.float64)
     return sweep(
         message.angle_min_rad + places * message.angle_increment_rad,
@@ -41,15 +39,6 @@ def beams_of(
         base_from_lidar,
         None if base_from_then is None else base_from_then(_times_ns(message, stamp_ns)),
         _limits(config),
-    )
-
-
-def _makes_sense(scan: LaserScan) -> bool:
-    """Whether a scan has beams in known directions."""
-    return (
-        bool(np.isfinite([scan.angle_min_rad, scan.angle_increment_rad]).all())
-        and scan.angle_increment_rad != 0
-        and len(scan.ranges_m) > 1
     )
 
 

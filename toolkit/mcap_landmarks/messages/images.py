@@ -78,9 +78,24 @@ class Image:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class Region:
+    """The part of the full sensor that the images of a CameraInfo show, in its pixels; all of it where sizes are 0."""
+
+    x_px: int = 0
+    y_px: int = 0
+    width_px: int = 0
+    height_px: int = 0
+    do_rectify: bool = False
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraInfo:
-    """Intrinsics of a camera: K (3, 3), distortion (n,) of `distortion_model`, R (3, 3), P (3, 4)."""
+    """Intrinsics of a camera: K (3, 3), distortion (n,) of `distortion_model`, R (3, 3), P (3, 4).
+
+    Sizes, K and P are of the full sensor; its images show a `region` of that, `binning` pixels of the sensor as one,
+    across and down, where 0 is 1. `of_rectified` is no part of the message: that its images are rectified ones already.
+    """
 
     ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/CameraInfo"
 
@@ -93,10 +108,20 @@ class CameraInfo:
     intrinsics: Array
     rectification: Array
     projection: Array
+    binning: tuple[int, int] = (0, 0)
+    region: Region = Region()
+    of_rectified: bool = False
 
     def to_ros(self) -> RosObject:
         """See `Message`."""
-        whole = make("sensor_msgs/RegionOfInterest", x_offset=0, y_offset=0, height=0, width=0, do_rectify=False)
+        region = make(
+            "sensor_msgs/RegionOfInterest",
+            x_offset=self.region.x_px,
+            y_offset=self.region.y_px,
+            height=self.region.height_px,
+            width=self.region.width_px,
+            do_rectify=self.region.do_rectify,
+        )
         return make(
             "sensor_msgs/CameraInfo",
             header=header_to_ros(self.stamp_ns, self.frame_id),
@@ -107,9 +132,9 @@ class CameraInfo:
             k=np.ascontiguousarray(self.intrinsics).ravel(),
             r=np.ascontiguousarray(self.rectification).ravel(),
             p=np.ascontiguousarray(self.projection).ravel(),
-            binning_x=0,
-            binning_y=0,
-            roi=whole,
+            binning_x=self.binning[0],
+            binning_y=self.binning[1],
+            roi=region,
         )
 
     @classmethod
@@ -125,4 +150,6 @@ class CameraInfo:
             np.array(ros.k, dtype=np.float64).reshape(3, 3),
             np.array(ros.r, dtype=np.float64).reshape(3, 3),
             np.array(ros.p, dtype=np.float64).reshape(3, 4),
+            (ros.binning_x, ros.binning_y),
+            Region(ros.roi.x_offset, ros.roi.y_offset, ros.roi.width, ros.roi.height, bool(ros.roi.do_rectify)),
         )

@@ -1,4 +1,4 @@
-"""LaserScan."""
+"""LaserScan, and the nearest echoes of a MultiEchoLaserScan."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Self
@@ -72,3 +72,39 @@ class LaserScan:
             np.array(ros.ranges, dtype=np.float32),
             np.array(ros.intensities, dtype=np.float32),
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MultiEchoLaserScan:
+    """A scan whose beams may have several echoes, of which the `nearest` counts: what is behind shines through it."""
+
+    ROS_TYPE: ClassVar[str] = "sensor_msgs/msg/MultiEchoLaserScan"
+
+    nearest: LaserScan
+
+    def to_ros(self) -> RosObject:
+        """See `Message`; each beam has one echo."""
+        fields = ("header", "angle_min", "angle_max", "angle_increment", "time_increment", "scan_time")
+        ros = self.nearest.to_ros()
+        return make(
+            "sensor_msgs/MultiEchoLaserScan",
+            **{name: getattr(ros, name) for name in (*fields, "range_min", "range_max")},
+            ranges=[make("sensor_msgs/LaserEcho", echoes=ros.ranges[i : i + 1]) for i in range(len(ros.ranges))],
+            intensities=[make("sensor_msgs/LaserEcho", echoes=one[None]) for one in ros.intensities],
+        )
+
+    @classmethod
+    def from_ros(cls, ros: RosObject) -> Self:
+        """See `Message`."""
+        nearest = [_nearest(beam.echoes, ros.range_min) for beam in ros.ranges]
+        strongest = [max(beam.echoes, default=0.0) for beam in ros.intensities]
+        ros.ranges, ros.intensities = np.array(nearest, dtype=np.float32), np.array(strongest, dtype=np.float32)
+        return cls(LaserScan.from_ros(ros))
+
+
+def _nearest(echoes_m: NDArray[np.float32], range_min_m: float) -> np.float32:
+    """The nearest of a beam's echoes (K,) that the sensor can measure; what it says instead where there is none."""
+    if len(echoes_m) < 2:
+        return echoes_m[0] if len(echoes_m) else np.float32(np.inf)
+    measured = echoes_m[(echoes_m > 0) & (echoes_m >= range_min_m)]
+    return np.float32(measured.min()) if len(measured) else echoes_m[0]

@@ -32,7 +32,10 @@ from mcap_landmarks.fusion.camera_view import CameraView, camera_from_info
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.geometry.frames import FrameTree, apply, plain, rigid
 from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.inspection.camera_images import CameraImages, images_of
 from mcap_landmarks.inspection.topic_roles import Choice, cameras_of, choose, chosen_before, message_type
+from mcap_landmarks.lidar.beams import echoes
+from mcap_landmarks.lidar.scan_repair import ScanTopic
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, stage_records
@@ -40,7 +43,7 @@ from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.codec import M, Message, decode
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
-from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.velocities import SceneVelocities
 from mcap_landmarks.moments import moment
@@ -142,11 +145,12 @@ def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
         channels = {c: channel for channel in (*_OF_BUNDLE, *_BESIDE) for c in _connections(recording, channel, choice)}
         found = _Around({channel: {} for channel in (*_OF_BUNDLE, *_BESIDE)})
         frames = cameras_of(recording, choice).frames()
+        images = images_of(recording, choice, _connections(recording, CAMERA_INFO, choice))
         around = recording.messages(channels, at_ns - _AROUND_NS, at_ns + _AROUND_NS)
         for raw in chain(_first_infos(recording, channels), around):
             channel = channels[raw.connection]
-            with contextlib.suppress(MessageError):
-                message = decode(message_type(channel, raw.connection), raw.data, _schema(raw.connection))
+            with contextlib.suppress(MessageError, RecordingError):
+                message = _read(raw, channel, images)
                 camera = frames.get(raw.connection.topic, "")
                 if isinstance(message, Detections | CameraInfo):
                     camera = plain(message.frame_id)
@@ -163,6 +167,16 @@ def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
 
 def _span(recording: Recording) -> str:
     return f"{moment(recording.start_ns or 0)} to {moment(recording.end_ns or 0)}"
+
+
+def _read(raw: RawMessage, channel: Channel[Message], images: Mapping[Connection, CameraImages]) -> Message:
+    """A message as the stages read it: scans repaired, a CameraInfo as that of its images."""
+    message = decode(message_type(channel, raw.connection), raw.data, _schema(raw.connection))
+    if isinstance(message, LaserScan | MultiEchoLaserScan):
+        return ScanTopic().take(message)[0]
+    if isinstance(message, CameraInfo) and raw.connection in images:
+        return images[raw.connection].read(message)
+    return message
 
 
 def _first_infos(recording: Recording, channels: Mapping[Connection, Channel[Message]]) -> Iterator[RawMessage]:
@@ -248,9 +262,9 @@ def _beside_cloud(
 
 def _points(recording: Recording, scan: LaserScan, base: str) -> Array:
     """Where the beams ended (N, 2), in the base frame if transforms lead there, else in the scanner's own."""
-    inside = np.isfinite(scan.ranges_m) & (scan.ranges_m >= scan.range_min_m) & (scan.ranges_m <= scan.range_max_m)
-    rows = np.flatnonzero(inside)
-    angle, range_m = scan.angle_min_rad + rows * scan.angle_increment_rad, scan.ranges_m[rows].astype(np.float64)
+    ranges_m = echoes(scan.ranges_m, scan.range_min_m, scan.range_max_m)
+    rows = np.flatnonzero(np.isfinite(ranges_m))
+    angle, range_m = scan.angle_min_rad + rows * scan.angle_increment_rad, ranges_m[rows]
     points = np.column_stack([range_m * np.cos(angle), range_m * np.sin(angle), np.zeros(len(rows))])
     with contextlib.suppress(RecordingError):
         points = apply(_frames(recording).lookup(base, scan.frame_id), points)

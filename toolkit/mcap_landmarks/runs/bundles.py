@@ -1,6 +1,6 @@
 """One recording as the bundles that a stage reads, in one pass."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -10,16 +10,18 @@ import numpy as np
 from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, ODOMETRY, TF_STATIC
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.geometry.frames import is_rigid
+from mcap_landmarks.inspection.camera_images import CameraImages
 from mcap_landmarks.inspection.examination import Examined
 from mcap_landmarks.inspection.format_checks import told_formats
 from mcap_landmarks.inspection.odometry_examination import STRAY
 from mcap_landmarks.inspection.topic_roles import ROLES, Choice, choose, could_be, message_type
+from mcap_landmarks.lidar.scan_repair import ScanTopic
 from mcap_landmarks.maps.scene_objects import usable
 from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.points import PointCloud2
-from mcap_landmarks.messages.scan import LaserScan
+from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.spatial_objects import SpatialObjects
 from mcap_landmarks.messages.transforms import TFMessage
@@ -35,6 +37,8 @@ _OF_CAMERAS = (CAMERA_INFO, DETECTIONS)
 
 Frames = Mapping[Connection, str]
 """The frames of several cameras, by the connections of their images and CameraInfos."""
+Images = Mapping[Connection, CameraImages]
+"""The images that CameraInfos go with, by the connections of these."""
 _Timed = LaserScan | PointCloud2 | Detections | SceneObjects
 """Messages that meet others by their stamps."""
 
@@ -50,7 +54,7 @@ class Span:
 
 @dataclass(slots=True)
 class Reading:
-    """What became of a recording's messages: what was associated, dropped by rule, or lost to damage."""
+    """What became of a recording's messages: what was associated, dropped or repaired by rule, or lost to damage."""
 
     association: Association = field(default_factory=Association)
     dropped: Counter[str] = field(default_factory=Counter)
@@ -79,7 +83,7 @@ class Reading:
         self.losses.extend(losses)
 
     def notes(self) -> dict[str, int]:
-        """Everything that was left out by rule, in words, with its count; nothing where nothing was."""
+        """Everything that was left out or repaired by rule, in words, with its count; nothing where nothing was."""
         association = self.association
         found = Counter(self.dropped)
         found["bundles without odometry at their time"] += association.without_odometry
@@ -134,11 +138,12 @@ class Correction:
     """What is done to messages before they are associated.
 
     `examined` tells clocks, frames and odometry; `frames` are those of several cameras: drivers often give images
-    another one than their CameraInfo.
+    another one than their CameraInfo. `images` are those that CameraInfos become those of.
     """
 
     examined: Examined | None = None
     frames: Frames = field(default_factory=dict)
+    images: Images = field(default_factory=dict)
 
     @property
     def track(self) -> OdometryTrack:
@@ -166,7 +171,8 @@ def read_bundles(
     of every other channel of `reads` the message nearest in time, of detections that of every camera. `seeds` hold from
     the start on, until others of their kind come. `reading` is kept up to date.
 
-    A message that cannot be decoded is a loss, an unusable object is dropped; both are counted.
+    A message that cannot be decoded is a loss, an unusable object is dropped, a scan that is not as the standard has it
+    is repaired; all are counted.
     """
     reading.name(inputs)
     present = {*inputs.values()} | {TF_STATIC for entry in inputs if entry.message_type == TFMessage.ROS_TYPE}
@@ -207,13 +213,19 @@ def decoded(
     Raises:
         RecordingError: scene objects are in a frame that no transforms lead from to the robot's.
     """
+    scans = defaultdict[Connection, ScanTopic](ScanTopic)
     for raw in raws:
         channel = inputs.get(raw.connection)
         if channel is None or (channel == ODOMETRY and raw.connection.message_type != TFMessage.ROS_TYPE):
             continue  # odometry was examined as a whole
         try:
             message: Message = decode(message_type(channel, raw.connection), raw.data)
-        except MessageError as error:
+            if isinstance(message, LaserScan | MultiEchoLaserScan):
+                message, repairs = scans[raw.connection].take(message)
+                reading.dropped.update(repairs)
+            elif isinstance(message, CameraInfo) and raw.connection in correction.images:
+                message = correction.images[raw.connection].read(message)
+        except (MessageError, RecordingError) as error:
             reading.lose(raw.connection.topic, raw.log_time_ns, str(error))
             continue
         if isinstance(message, TFMessage):  # one message may hold odometry and where a sensor is

@@ -11,7 +11,16 @@ from mcap_landmarks.manifest import StageRecord
 from mcap_landmarks.runs.bundles import inputs_of
 from mcap_landmarks.runs.clock_refusal import refuse_clocks
 from mcap_landmarks.runs.needed_stages import missing_stages
-from mcap_landmarks.runs.plan import Request, Step, choice_options, inputs_of_stage, is_result, plan, record_of
+from mcap_landmarks.runs.plan import (
+    Request,
+    Step,
+    check_cameras,
+    choice_options,
+    inputs_of_stage,
+    is_result,
+    plan,
+    record_of,
+)
 from mcap_landmarks.runs.session import open_session
 from mcap_landmarks.stage import Config
 from mcap_landmarks.stages.build_map import STAGE
@@ -78,7 +87,9 @@ def _plan_log(place: str, config: Config, request: Request, task: MapTask, parts
         log, choice = session.log, session.request.span.choice
         sensed = [channel for channel in STAGE.required if not is_result(channel, choice)]
         inputs_of(log.without_results(), sensed, sensed, choice)  # before hours are spent on the other stages
-        steps = tuple(plan(session.request, log, missing_stages(STAGE, log, request.use)))
+        names = missing_stages(STAGE, log, request.use)
+        check_cameras(session.request, log, names)
+        steps = tuple(plan(session.request, log, names))
         refuse_clocks(session, steps)
         inputs, options = inputs_of_stage(STAGE, log, steps), choice_options(choice, STAGE.reads)
         record = record_of(STAGE, config, task.files, inputs, options)

@@ -12,7 +12,7 @@ from mcap_landmarks.progress import Watch, unwatched
 from mcap_landmarks.runs.clock_refusal import clock_notes
 from mcap_landmarks.runs.needed_stages import in_order, missing_stages
 from mcap_landmarks.runs.output_writer import write_output
-from mcap_landmarks.runs.plan import Request, plan
+from mcap_landmarks.runs.plan import Request, check_cameras, plan
 from mcap_landmarks.runs.session import StageRun, open_session, parts_folder
 from mcap_landmarks.stages import find_stage
 
@@ -56,6 +56,7 @@ def run_stages(
             use = (*session.request.use, *names)
             before = [other for name in names for other in missing_stages(find_stage(name), session.log, use)]
             names = in_order([*before, *names])
+        check_cameras(session.request, session.log, names)
         steps = plan(session.request, session.log, names)
         clocks = clock_notes(session, steps)
         runs = [session.work(step, watch) for step in steps]

@@ -7,9 +7,11 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
-from mcap_landmarks.channels import ODOMETRY, RESULTS
-from mcap_landmarks.config import Settings, effective, load_files
+from mcap_landmarks.channels import CAMERA_INFO, ODOMETRY, RESULTS
+from mcap_landmarks.config import Settings, effective, load, load_files
 from mcap_landmarks.errors import ToolkitError
+from mcap_landmarks.fusion.config import FuseConfig
+from mcap_landmarks.inspection.camera_checks import refuse_cameras
 from mcap_landmarks.inspection.topic_roles import OFFSET_ROLES, ROLES, Choice
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RECORDING, StageRecord, code_hash, file_hash, is_generated
@@ -85,6 +87,21 @@ def plan(request: Request, log: RecordedLog, names: Sequence[str]) -> list[Step]
             record = replace(record, resources={**hashes, **record.resources}, origins=origins)
         steps.append(Step(stage, config, files.paths, record))
     return steps
+
+
+def check_cameras(request: Request, log: RecordedLog, names: Sequence[str]) -> None:
+    """Refuse cameras that cannot be understood before images are looked at, if a stage of some needs both.
+
+    Raises:
+        UsageError: a setting of that stage is wrong.
+        RecordingError: see `refuse_cameras`.
+    """
+    for name in names:
+        stage = find_stage(name)
+        if CAMERA_INFO in stage.reads:
+            config = load(name, request.settings)
+            if isinstance(config, FuseConfig) and config.method == "default":
+                refuse_cameras(log.without_results(), log.choice, config.rectified)
 
 
 def _earlier(stage: Stage, log: RecordedLog, generated: bool) -> StageRecord | None:

@@ -2,17 +2,19 @@
 
 import contextlib
 import copy
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import chain
 from typing import Self
 
 from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, DETECTIONS, ODOMETRY, TF_STATIC
 from mcap_landmarks.errors import MessageError, RecordingError, UsageError
+from mcap_landmarks.inspection.camera_images import CameraImages, images_of
 from mcap_landmarks.inspection.cameras import NO_CAMERAS, Cameras, info_frames
 from mcap_landmarks.inspection.examination import Asked, Examined, Examiner
 from mcap_landmarks.inspection.odometry_examination import ExaminedOdometry
 from mcap_landmarks.inspection.topic_roles import OFFSET_ROLES, cameras_of, choose, message_type
 from mcap_landmarks.messages.codec import M, Message, decode
+from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.layered_log import LayeredLog
 from mcap_landmarks.recording.odometry_track import odometry_from
@@ -40,13 +42,15 @@ class StageInput:
         self._primaries = [entry for entry, channel in self._inputs.items() if channel == stage.reads[0]]
         self.primary = self._primaries[0]
         cameras = cameras_of(log, span.choice) if {CAMERA_IMAGE, CAMERA_INFO} & {*self._inputs.values()} else NO_CAMERAS
-        self._correction = Correction(self._examined(examiner), self._frames_of(cameras))
+        images = self._images()
+        self._correction = Correction(self._examined(examiner), self._frames_of(cameras), images)
         refusal = self._odometry.refusal
         if refusal and ODOMETRY in stage.required:
             raise RecordingError(f"{self.path}: {refusal}")
         self.notes = (
             *cameras.notes(),
             *self._odometry.notes,
+            *self._notes_of(images),
             *([f"goes on without odometry: {refusal}"] * bool(refusal)),
         )
 
@@ -87,6 +91,17 @@ class StageInput:
     def close(self) -> None:
         """Sum up what became of the messages, when all of them were read."""
         self.reading.close(self._log.losses)
+
+    def _images(self) -> dict[Connection, CameraImages]:
+        """The images that the log's CameraInfos go with."""
+        infos = [entry for entry, channel in self._inputs.items() if channel == CAMERA_INFO]
+        return images_of(self._log, self._span.choice, infos) if infos else {}
+
+    def _notes_of(self, images: Mapping[Connection, CameraImages]) -> Iterator[str]:
+        for entry, beside in images.items():
+            raw = next(iter(self._log.messages([entry])), None)
+            with contextlib.suppress(MessageError):
+                yield from () if raw is None else beside.notes(entry.topic, decode(CameraInfo, raw.data))
 
     def _frames_of(self, used: Cameras) -> dict[Connection, str]:
         """The frames of several cameras, by connection; where none were chosen, as their CameraInfos tell them."""

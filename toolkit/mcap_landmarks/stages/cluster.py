@@ -1,7 +1,7 @@
 """Turn LiDAR scans into objects: where the centre of each one is, for every class that it could be."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -26,25 +26,31 @@ from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.object_tracks import PieceChange, Tracks
 from mcap_landmarks.lidar.objects import Hypotheses
 from mcap_landmarks.lidar.scan_beams import beams_of
+from mcap_landmarks.lidar.skew import is_timed, offsets_s, skew_covariances, unsure_motion
 from mcap_landmarks.lidar.whole_clouds import CloudObject, WholeCloud, points_in_base, whole_cloud
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.boxes import Boxes
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
+from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.mounting import Mounting
-from mcap_landmarks.stage import Bundle, Omission, Stage, Stamped
+from mcap_landmarks.stage import Bundle, Channel, Omission, Stage, Stamped
 from mcap_landmarks.vision.prefetch import in_order
 
 _BASES = (BASE_FRAME, "base_link")
 _NOTHING_STANDS = "clouds in which nothing stands on the ground"
+_NO_ODOMETRY = "scans that could not be de-skewed without odometry; what they show is less sure"
+_NO_TIMES = (
+    "scans that could not be de-skewed: their beams have no times, and the robot moves; what they show is less sure"
+)
 
 
 def process(
     bundles: Iterable[Bundle], config: ClusterConfig, resources: Mapping[str, Location]
 ) -> Iterator[Stamped | Omission]:
-    """The objects of every scan, none for a scan that shows none; a scan without directions is an omission.
+    """The objects of every scan, none for a scan that shows none; what could not be de-skewed is counted.
 
     Raises:
         RecordingError: it is not known where the LiDAR sits.
@@ -67,15 +73,14 @@ def process(
             if not len(whole.clusters):
                 yield Omission(bundle.log_time_ns, _NOTHING_STANDS)
             continue
-        beams = _beams(bundle, base, mounting, config)
-        if beams is None:
-            yield Omission(bundle.log_time_ns, "a scan does not say in which directions its beams are", lost=True)
-            continue
-        found = cluster(beams, shapes, config)
+        found = cluster(_beams(bundle, base, mounting, config), shapes, config)
+        found, is_skewed = _unsure(bundle, base, mounting, config, found)
         places = np.array([one.shares @ one.positions_xy for one in found]).reshape(-1, 2)
         odom_from_base = None if bundle.odometry is None else bundle.odometry.odom_from_base
         names = tracks.names(bundle.stamp_ns, odom_from_base, places)
         yield Stamped(SCAN_OBJECTS, bundle.log_time_ns, _message(bundle.stamp_ns, base, names, found))
+        if is_skewed:
+            yield Omission(bundle.log_time_ns, _NO_ODOMETRY if bundle.odometry is None else _NO_TIMES)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,8 +146,8 @@ def _base_of(bundle: Bundle, mounting: Mounting) -> str:
     return base
 
 
-def _beams(bundle: Bundle, base: str, mounting: Mounting, config: ClusterConfig) -> Beams | None:
-    """The beams of a bundle's LiDARs, None if none of them makes sense."""
+def _beams(bundle: Bundle, base: str, mounting: Mounting, config: ClusterConfig) -> Beams:
+    """The beams of a bundle's LiDARs."""
     moved = None if bundle.odometry is None else partial(bundle.odometry.base_from_then, bundle.stamp_ns)
     found = []
     for channel in (SCAN, SECOND_SCAN):
@@ -150,8 +155,44 @@ def _beams(bundle: Bundle, base: str, mounting: Mounting, config: ClusterConfig)
         if isinstance(message, LaserScan | PointCloud2):
             base_from_lidar = mounting.lookup(bundle, base, message.frame_id)
             found.append(beams_of(message, bundle.stamp_ns, base_from_lidar, moved, config))
-    usable = [beams for beams in found if beams is not None]
-    return together(usable) if usable else None
+    return together(found)
+
+
+def _unsure(
+    bundle: Bundle, base: str, mounting: Mounting, config: ClusterConfig, found: list[Hypotheses]
+) -> tuple[list[Hypotheses], bool]:
+    """The objects of a bundle's scans, as unsure as these are skewed, and whether they are more than ranges are."""
+    skewed, motion = _skewed(bundle, config)
+    if not (skewed and motion.any() and found):
+        return found, False
+    places = np.concatenate([one.positions_xy for one in found])
+    of_each = [
+        skew_covariances(
+            places, offsets_s(one, bundle.stamp_ns, mounting.lookup(bundle, base, one.frame_id), places), motion
+        )
+        for one in skewed
+    ]
+    # Two LiDARs show a thing at two times; the one that costs more counts.
+    costs = np.trace(np.array(of_each), axis1=2, axis2=3)
+    added = np.take_along_axis(np.array(of_each), costs.argmax(axis=0)[None, :, None, None], axis=0)[0]
+    parts = np.split(added, np.cumsum([len(one.positions_xy) for one in found])[:-1])
+    unsure = [replace(one, covariances=one.covariances + part) for one, part in zip(found, parts, strict=True)]
+    return unsure, bool(costs.max() > config.sigma_m**2)
+
+
+def _skewed(bundle: Bundle, config: ClusterConfig) -> tuple[list[LaserScan | PointCloud2], Array]:
+    """The scans of a bundle that are not de-skewed, and the mean squares (3, 3) of the base's velocity meanwhile."""
+    found = [_measured(bundle, channel) for channel in (SCAN, SECOND_SCAN)]
+    scans = [message for message in found if message is not None]
+    if bundle.odometry is None:
+        return scans, unsure_motion(config)
+    velocity = bundle.odometry.velocity
+    return [message for message in scans if not is_timed(message)], np.outer(velocity, velocity)
+
+
+def _measured(bundle: Bundle, channel: Channel[Message]) -> LaserScan | PointCloud2 | None:
+    message = bundle.messages.get(channel)
+    return message if isinstance(message, LaserScan | PointCloud2) else None
 
 
 def _as_in_the_thesis(bundles: Iterable[Bundle], mounting: Mounting) -> Iterator[Stamped]:

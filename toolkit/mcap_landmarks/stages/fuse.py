@@ -18,6 +18,7 @@ from mcap_landmarks.channels import (
     TF_STATIC,
 )
 from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.fusion.camera_info import NO_INFO
 from mcap_landmarks.fusion.camera_view import CameraView, SeenImage, camera_from_info
 from mcap_landmarks.fusion.cloud_fuser import CloudFuser
 from mcap_landmarks.fusion.config import FuseConfig
@@ -113,10 +114,7 @@ class _Cameras:
         """The CameraInfo of a frame; one camera's may be of another than its images."""
         infos = bundle.each(CAMERA_INFO)
         if not infos:
-            raise RecordingError(
-                f"there is no {CameraInfo.ROS_TYPE} for the camera of {DETECTIONS.topic}; record the camera's, or read "
-                f"another topic as it with --remap TOPIC={CAMERA_INFO.topic}"
-            )
+            raise RecordingError(NO_INFO)
         own = [info for info in infos if plain(info.frame_id) == plain(frame_id)]
         if not own and (len(infos) > 1 or len(self.frames) > 1):
             frames = " and ".join(info.frame_id for info in infos)
