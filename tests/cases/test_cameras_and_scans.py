@@ -44,5 +44,5 @@ def test_a_camera_that_cannot_be_understood_is_refused_before_images_are_looked_
         assert "/camera/camera_info: the CameraInfo is of 320 x 240 pixels, but the images are of 640 x 480; " in said
         assert "detect" not in said
     assert list(tmp_path.iterdir()) == []
-    assert call("info", log, "--check") == 0
+    assert call("info", log, "--check") == 3
     assert "problem: /camera/camera_info: the CameraInfo is of 320 x 240 pixels" in capsys.readouterr().out
