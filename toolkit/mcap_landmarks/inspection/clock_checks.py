@@ -14,7 +14,6 @@ from mcap_landmarks.inspection.turn_samples import (
     SampledOdometry,
     SensorTurns,
     most_and_least_turning,
-    read_track,
     read_turns,
     stretches,
 )
@@ -74,15 +73,11 @@ class Comparison:
 
 
 def compare(
-    read: Read, span: tuple[int, int], odometry: Sequence[Connection], sights: Sequence[Sight]
+    read: Read, span: tuple[int, int], topic: str, track: SampledOdometry, sights: Sequence[Sight]
 ) -> list[Comparison]:
-    """Odometry, on one topic, against each of some sensors in the span of log times; nothing where there is none."""
-    spans = stretches(*span)
-    track = read_track(read, odometry, spans) if sights else None
-    if track is None:
-        return []
-    chosen = most_and_least_turning(track, spans)
-    return [_compared(read, chosen, odometry[0].topic, track, sight) for sight in sights]
+    """Odometry on a topic against each of some sensors in the span of log times."""
+    chosen = most_and_least_turning(track, stretches(*span))
+    return [_compared(read, chosen, topic, track, sight) for sight in sights]
 
 
 def _compared(

@@ -3,13 +3,12 @@
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 
-from mcap_landmarks.channels import ODOMETRY
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.inspection.clock_checks import Comparison, Sight, compare
+from mcap_landmarks.inspection.odometry_examination import ExaminedOdometry
 from mcap_landmarks.inspection.open_logs import OpenLog
 from mcap_landmarks.inspection.sensor_mounts import mount_of
-from mcap_landmarks.inspection.topic_roles import ROLES
-from mcap_landmarks.inspection.turn_samples import Read
+from mcap_landmarks.inspection.turn_samples import Read, sampled
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import STAGE
 from mcap_landmarks.messages.codec import decode
@@ -26,18 +25,20 @@ _SEEING = ("scan", "scene_objects")
 _COMPARED = (LaserScan.ROS_TYPE, SceneObjects.ROS_TYPE)
 
 
-def clocks_of(log: OpenLog, roles: Mapping[str, Sequence[str]]) -> list[Comparison]:
-    """The comparisons of every topic of odometry with every one of scans and recorded scene objects."""
+def clocks_of(
+    log: OpenLog, roles: Mapping[str, Sequence[str]], odometry: Mapping[str, ExaminedOdometry]
+) -> list[Comparison]:
+    """The comparisons of examined odometry, by topic, with every topic of scans and recorded scene objects."""
     if log.start_ns is None or log.end_ns is None:
         return []
     connections = [entry.connection for part in log.parts for entry in part.channels if entry.count]
     sensors = [
         (role, one) for role in _SEEING for one in _on(roles.get(role, ()), connections) if STAGE not in one.metadata
     ]
+    span = log.start_ns, log.end_ns + 1
     found: list[Comparison] = []
-    for topic in roles.get(ROLES[ODOMETRY].name, ()):
-        odometry = _on([topic], connections)
-        found += clocks_between(partial(_read, log), (log.start_ns, log.end_ns + 1), odometry, sensors, connections)
+    for topic, examined in odometry.items():
+        found += clocks_between(partial(_read, log), span, (topic, examined), sensors, connections)
     return found
 
 
@@ -48,17 +49,19 @@ def _on(topics: Collection[str], connections: Iterable[Connection]) -> list[Conn
 def clocks_between(
     read: Read,
     span: tuple[int, int],
-    odometry: Sequence[Connection],
+    odometry: tuple[str, ExaminedOdometry],
     sensors: Iterable[tuple[str, Connection]],
     connections: Iterable[Connection],
     extrinsics: Location | None = None,
 ) -> list[Comparison]:
-    """The comparisons of one odometry with sensors (role, connection) that see the robot turn.
+    """The comparisons of one topic's odometry with sensors (role, connection) that see the robot turn.
 
-    Of `connections` those with transforms tell how sensors are mounted; `extrinsics` is a file that does.
+    Where a clock was set back, stamps do not tell which of them belong together, and nothing is compared. Of
+    `connections` those with transforms tell how sensors are mounted; `extrinsics` is a file that does.
     """
     seeing = [(role, one) for role, one in sensors if one.message_type in _COMPARED]
-    if not odometry or not seeing:
+    topic, examined = odometry
+    if examined.track is None or examined.delay_ns is None or not seeing:
         return []
     transforms = list(_transforms(read, connections, span))
     sights = []
@@ -66,7 +69,7 @@ def clocks_between(
         mount = mount_of(_frame(read, connection, span), transforms, extrinsics)
         if mount is not None:
             sights.append(Sight(role, connection, mount))
-    return compare(read, span, odometry, sights)
+    return compare(read, span, topic, sampled(examined.track, examined.delay_ns), sights)
 
 
 def _read(log: OpenLog, connections: Collection[Connection], start_ns: int, end_ns: int) -> Iterator[RawMessage]:

@@ -12,6 +12,7 @@ from mcap_landmarks.inspection.checks import check
 from mcap_landmarks.inspection.clock_reading import clocks_of
 from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.inspection.format_checks import check_formats
+from mcap_landmarks.inspection.odometry_checks import examined_odometry
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog, open_logs
 from mcap_landmarks.inspection.survey import survey
 from mcap_landmarks.inspection.topic_roles import ROLES, Role, could_be, topics_for
@@ -113,7 +114,7 @@ def _checked(log: OpenLog, info: LogInfo, watch: Watch) -> LogInfo:
     """What is known of a log when all of it was read: what is damaged, what will cost results, and which verbs fail."""
     with watch(f"check {log.name}", log.size_bytes) as progress:
         found = survey(log, info.roles, progress)
-        found.clocks = clocks_of(log, info.roles)
+        found.clocks = clocks_of(log, info.roles, examined_odometry(found))
     network, about_it = _network(log) if found.of("image") else (None, [])
     formats = [one for part in log.parts if isinstance(part, McapLog) for one in check_formats(part.recorded)]
     findings = (*formats, *about_it, *check(found))

@@ -36,8 +36,7 @@ def check_stray_stamps(found: Survey) -> Iterator[Finding]:
 
 def check_odometry(found: Survey) -> Iterator[Finding]:
     """Odometry that is refused, mended or partly left out."""
-    for topic, messages in sorted(found.odometry.items()):
-        result = _examined(found, topic, messages)
+    for topic, result in examined_odometry(found).items():
         if result.refusal:
             text, _, remedy = result.refusal.removeprefix(f"{topic}: ").partition("; ")
             yield Finding("problem", "odometry", topic, text, remedy)
@@ -45,6 +44,11 @@ def check_odometry(found: Survey) -> Iterator[Finding]:
         for note in (*result.notes, *left_out):
             text, _, remedy = note.partition("; ")
             yield Finding("warning", "odometry", topic, text, remedy or _MENDED)
+
+
+def examined_odometry(found: Survey) -> dict[str, ExaminedOdometry]:
+    """The odometry of each topic as stages will take it."""
+    return {topic: _examined(found, topic, messages) for topic, messages in sorted(found.odometry.items())}
 
 
 def _examined(found: Survey, topic: str, messages: OdometryMessages) -> ExaminedOdometry:

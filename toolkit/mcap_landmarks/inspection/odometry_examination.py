@@ -76,13 +76,15 @@ class OdometryMessages:
 class ExaminedOdometry:
     """Odometry that can be used, None where it cannot and `refusal` says why and what to do.
 
-    `dropped` counts the messages that were left out, by reason; `notes` say what was made of the others.
+    `dropped` counts the messages that were left out, by reason; `notes` say what was made of the others. `delay_ns` is
+    how much later than stamped messages are logged, None where their clock was set back.
     """
 
     track: OdometryTrack | None
     refusal: str = ""
     dropped: Counter[str] = field(default_factory=Counter)
     notes: tuple[str, ...] = ()
+    delay_ns: int | None = None
 
 
 def examine(topic: str, messages: OdometryMessages, clock: Clock, base_from: BaseFromFrame) -> ExaminedOdometry:
@@ -112,7 +114,8 @@ def examine(topic: str, messages: OdometryMessages, clock: Clock, base_from: Bas
         return ExaminedOdometry(None, str(error), +dropped)
     # What was mended is not where the log's own frame has it.
     named = track if told.mended else replace(track, frame_id=frame)
-    return ExaminedOdometry(named, "", +dropped, (*told.mended, *told.notes))
+    delay_ns = clock.delay_ns if len(clock.shifts_ns) == 1 else None
+    return ExaminedOdometry(named, "", +dropped, (*told.mended, *told.notes), delay_ns)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,45 +6,36 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.channels import ODOMETRY
 from mcap_landmarks.errors import MessageError
-from mcap_landmarks.estimation.clock_offset import WIDEST_LAG_S, Headings, Turns
+from mcap_landmarks.estimation.clock_offset import Headings, Turns
 from mcap_landmarks.estimation.object_rotation import object_turn
 from mcap_landmarks.geometry.se2 import Array, between, compose
 from mcap_landmarks.inspection.sensor_mounts import Mount
-from mcap_landmarks.inspection.topic_roles import message_type
+from mcap_landmarks.lidar.scan_repair import ScanTopic
 from mcap_landmarks.lidar.scan_rotation import turn_between
 from mcap_landmarks.messages.codec import decode
-from mcap_landmarks.messages.poses import Odometry
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scene import SceneObjects
-from mcap_landmarks.recording.odometry_track import odometry_from
+from mcap_landmarks.recording.odometry_track import OdometryTrack
 from mcap_landmarks.stage import Connection, RawMessage
 
 Read = Callable[[Collection[Connection], int, int], Iterable[RawMessage]]
 """Messages of connections by log time, from a time on and before another."""
 
 _STRETCH_NS = 8 * 10**9
-_MARGIN_NS = round((WIDEST_LAG_S + 0.5) * 1e9)
-"""Odometry is read so far beyond both ends of a stretch, for the lags that are tried."""
 _MOST_STRETCHES = 20
-"""In so many stretches, spread over the log, odometry is looked at: it is quick to read."""
+"""Of so many stretches, spread over the log, those are chosen that sensors are looked at in."""
 _TURNING, _QUIET = 5, 2
 """In so many of them the sensors are, where odometry turns most and where it turns least: some 600 scans at 10 Hz."""
-_ODOMETRY_STEP_NS = 45_000_000
 _STEP_NS = 90_000_000
-"""Messages that come faster are thinned, odometry to 20 Hz and sensors to 10 Hz: enough for the turns of robots."""
+"""Messages that come faster are thinned to 10 Hz: enough for the turns of robots."""
 _LONGEST_STEP_NS = 1_200_000_000
 """Scans farther apart share too little to be matched."""
-_LEVEL = 0.8
-"""Odometry whose body leans more (cosine) is not of a robot in the plane, or of a frame whose z axis is not up."""
-_STILL = 1e-3
-"""Metres and radians: poses that change by less never move."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SampledOdometry:
-    """Odometry of some stretches: stamps (N,) that rise strictly, poses (N, 3) whose headings add up.
+    """Odometry: stamps (N,) that rise strictly, poses (N, 3) whose headings add up.
 
     `delay_ns` is how much later than they were messages are logged, on the median.
     """
@@ -73,60 +64,15 @@ def stretches(start_ns: int, end_ns: int) -> list[tuple[int, int]]:
     return [(start_ns + int(i) * _STRETCH_NS, start_ns + (int(i) + 1) * _STRETCH_NS) for i in places]
 
 
-def read_track(read: Read, odometry: Sequence[Connection], spans: Sequence[tuple[int, int]]) -> SampledOdometry | None:
-    """Odometry around some stretches; None if there is none that moves in the plane.
-
-    Where the poses never move and the velocities do, these are integrated.
-    """
-    stamps: list[int] = []
-    delays: list[int] = []
-    found: list[Odometry] = []
-    last_ns = -(2**63)
-    for start_ns, end_ns in spans:
-        first_ns = max(start_ns - _MARGIN_NS, last_ns + _ODOMETRY_STEP_NS)
-        for raw in read(odometry, first_ns, end_ns + _MARGIN_NS):
-            if raw.log_time_ns < last_ns + _ODOMETRY_STEP_NS:
-                continue
-            message = _odometry(raw)
-            if message is not None:
-                last_ns = raw.log_time_ns
-                stamps.append(message.stamp_ns or raw.log_time_ns)
-                delays.append(raw.log_time_ns - stamps[-1])
-                found.append(message)
-    return _track(np.array(stamps, dtype=np.int64), found, _median(delays))
+def sampled(track: OdometryTrack, delay_ns: float) -> SampledOdometry:
+    """Odometry as it was examined, with headings that add up; it is logged so much later than stamped."""
+    poses = track.odom_from_base.copy()
+    poses[:, 2] = np.unwrap(poses[:, 2])
+    return SampledOdometry(track.stamps_ns, poses, delay_ns)
 
 
 def _median(values: Sequence[float]) -> float:
     return float(np.median(values)) if values else 0.0
-
-
-def _odometry(raw: RawMessage) -> Odometry | None:
-    """The odometry in a message, if it has any that is of use."""
-    try:
-        message = odometry_from(decode(message_type(ODOMETRY, raw.connection), raw.data))
-    except MessageError:
-        return None
-    if message is None or not np.isfinite([*message.position_m, *message.orientation_xyzw]).all():
-        return None
-    return message if message.orientation_xyzw.any() else None
-
-
-def _track(stamps: NDArray[np.int64], found: Sequence[Odometry], delay_ns: float) -> SampledOdometry | None:
-    if len(stamps) < 2:
-        return None
-    stamps, first = np.unique(stamps, return_index=True)
-    messages = [found[i] for i in first]
-    quaternions = np.array([message.orientation_xyzw for message in messages])
-    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
-    if len(stamps) < 2 or (1 - 2 * (quaternions[:, 0] ** 2 + quaternions[:, 1] ** 2)).min() < _LEVEL:
-        return None
-    poses = np.array([message.pose for message in messages])
-    poses[:, 2] = np.unwrap(poses[:, 2])
-    rates = np.array([message.angular_radps[2] for message in messages])
-    if np.ptp(poses, axis=0).max() < _STILL and np.isfinite(rates).all():
-        turned = np.cumsum(np.diff(stamps) * 1e-9 * (rates[1:] + rates[:-1]) / 2)
-        poses[1:, 2] = poses[0, 2] + turned
-    return SampledOdometry(stamps, poses, delay_ns)
 
 
 def most_and_least_turning(track: SampledOdometry, spans: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -204,12 +150,14 @@ def _bearing_sigmas(scene: SceneObjects) -> list[float]:
 
 def _messages(raws: Iterable[RawMessage]) -> Iterator[tuple[int, LaserScan | SceneObjects]]:
     """Log times and messages with stamps: log times where those are zero."""
+    topic = ScanTopic()
     for raw in raws:
-        kind: type[LaserScan | SceneObjects] = SceneObjects
-        if raw.connection.message_type == LaserScan.ROS_TYPE:
-            kind = LaserScan
+        message: LaserScan | SceneObjects
         try:
-            message = decode(kind, raw.data)
+            if raw.connection.message_type == LaserScan.ROS_TYPE:
+                message, _ = topic.take(decode(LaserScan, raw.data))
+            else:
+                message = decode(SceneObjects, raw.data)
         except MessageError:
             continue
         yield raw.log_time_ns, message if message.stamp_ns else replace(message, stamp_ns=raw.log_time_ns)

@@ -3,7 +3,7 @@
 import contextlib
 from collections.abc import Sequence
 
-from mcap_landmarks.channels import ODOMETRY, SCAN, SCENE_OBJECTS, SECOND_SCAN
+from mcap_landmarks.channels import SCAN, SCENE_OBJECTS, SECOND_SCAN
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.inspection.clock_checks import clock_findings
 from mcap_landmarks.inspection.clock_reading import clocks_between
@@ -21,6 +21,9 @@ def refuse_clocks(session: Session, steps: Sequence[Step]) -> None:
     Raises:
         RecordingError: as it says.
     """
+    examined = session.odometry()
+    if examined is not None and examined[1].refusal:
+        raise RecordingError(f"{session.log.path}: {examined[1].refusal}")
     for found in _problems(session, steps):
         raise RecordingError(f"{session.log.path}: {_words(found)}")
 
@@ -43,15 +46,15 @@ def _problems(session: Session, steps: Sequence[Step]) -> list[Finding]:
     is taken as it is.
     """
     log, choice = session.log, session.request.span.choice
-    span = _span(session)
-    if "odometry" in choice.offsets_ns or span is None:
+    span, odometry = _span(session), session.odometry()
+    if "odometry" in choice.offsets_ns or span is None or odometry is None:
         return []
     seeing: tuple[Channel[Message], ...] = (SCAN, SECOND_SCAN) if _makes_scenes(session, steps) else (SCENE_OBJECTS,)
     own = log.without_results()
     compared = clocks_between(
         own.messages,
         span,
-        _chosen(session, ODOMETRY),
+        odometry,
         [(OFFSET_ROLES[channel], one) for channel in seeing for one in _chosen(session, channel)],
         [entry.connection for entry in own.channels],
         session.request.files.get("extrinsics"),

@@ -7,10 +7,11 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mcap_landmarks.channels import DRAWN, SHARED
+from mcap_landmarks.channels import DRAWN, ODOMETRY, SHARED
 from mcap_landmarks.errors import RecordingError, UsageError
-from mcap_landmarks.inspection.examination import Examiner
-from mcap_landmarks.inspection.topic_roles import chosen_before
+from mcap_landmarks.inspection.examination import Asked, Examiner
+from mcap_landmarks.inspection.odometry_examination import ExaminedOdometry
+from mcap_landmarks.inspection.topic_roles import choose, chosen_before
 from mcap_landmarks.manifest import Outcome, StageRecord
 from mcap_landmarks.mounting import read_extrinsics
 from mcap_landmarks.progress import Watch
@@ -112,6 +113,17 @@ class Session:
         read = [self.results[name] for name in sorted(record.inputs) if name in self.results]
         topics = {entry.connection.topic for layer in read for entry in layer.channels}
         return LayeredLog(self.log.path, [self.own_without(topics), *read])
+
+    def odometry(self) -> tuple[str, ExaminedOdometry] | None:
+        """The topic of the log's odometry, and what can be used of it; None where there is none."""
+        own = self.log.without_results()
+        with contextlib.suppress(UsageError):  # stages say so
+            inputs = dict.fromkeys(choose(own, ODOMETRY, self.request.span.choice), ODOMETRY)
+            if inputs:
+                first = next(iter(inputs))
+                examined = self.examiner.examine(own, Asked(inputs, first)).odometry
+                return None if examined is None else (first.topic, examined)
+        return None
 
     def work(self, step: Step, watch: Watch) -> StageRun:
         """The results of a step: found, or made now."""
