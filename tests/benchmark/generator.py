@@ -98,7 +98,7 @@ def memory(folder: Path, quick: bool) -> Iterator[Row]:
 
 def _peak_mib(scenario: Path, laps: int, output: Path) -> float:
     command = [sys.executable, "-c", "from mcap_landmarks.cli.main import run; run()", "generate", str(scenario)]
-    options = ["-o", str(output), "--workers", "1", "--set", f"trajectory.laps={laps}"]
+    options = ["-o", str(output), "--overwrite", "--workers", "1", "--set", f"trajectory.laps={laps}"]
     with subprocess.Popen([*command, *options], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as child:
         _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)

@@ -85,7 +85,7 @@ def spoilt_positions(folder: Path, repeats: int) -> Iterator[Row]:
     for repeat in range(repeats):
         spoilt, out = folder / "spoilt.mcap", folder / "localized.mcap"
         spoil(logs[1], spoilt, POOR, SEED + 1 + repeat)
-        document = call("localize", spoilt, "--map", database, "-o", out, "--force")
+        document = call("localize", spoilt, "--map", database, "-o", out, "--overwrite", "--force")
         bundles += document["bundles"]
         false += call("evaluate", out, "--align")["false"]["count"]
         more, found = _localized_of_seeing(out)
@@ -101,9 +101,10 @@ def cluttered_scenes(folder: Path) -> Iterator[Row]:
     for label, spoiling in (("", Spoiling()), (", spoilt detections", POOR)):
         given, out = folder / "given.mcap", folder / "fused.mcap"
         spoil(log, given, spoiling, SEED)
-        call("fuse", given, "-o", out, "--force")
+        call("fuse", given, "-o", out, "--overwrite", "--force")
         found = tally(out)
-        call("run", given, "-o", out, "--stages", "cluster,fuse", "--method", "thesis", "--force")
+        thesis_way = ("--stages", "cluster,fuse", "--method", "thesis", "--overwrite", "--force")
+        call("run", given, "-o", out, *thesis_way)
         thesis = tally(out)
         peers = {
             f"{whose}{key}": float(value)

@@ -97,9 +97,9 @@ def _outcome(
     if method == "default":  # each bundle without what came before it; the thesis knows no other way
         call("localize", result, "--map", database, "-o", alone, *given, "--set", "localize.join_m=0")
         by_itself = at_stops(alone, stops, aligned=False)
-    call("map", maps[1], "--map", database, *given)
+    call("map", maps[1], "--map", database, "--overwrite", *given)
     groups_drift = groups_mapped(database, maps[0], aligned=True)
-    call("localize", asked[1], "--map", database, "-o", result, *given)
+    call("localize", asked[1], "--map", database, "-o", result, "--overwrite", *given)
     return Outcome(groups, groups_drift, perfect, by_itself, at_stops(result, stops, aligned=True))
 
 

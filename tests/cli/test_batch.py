@@ -38,6 +38,7 @@ def test_one_that_fails_does_not_stop_the_others(
     assert [log["outcome"] for log in document["logs"]] == ["done", "done", "partial", "failed"]
     assert [log["exit_code"] for log in document["logs"]] == [0, 0, 3, 1]
     jsonschema.validate(document["logs"][1]["result"], schema_of("localize"))
+    jsonschema.validate(document["logs"][3]["result"], schema_of("error"))
     assert "none.mcap is not an MCAP file" in printed.err
     assert "cut at byte" in printed.err
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.mcap", "b.mcap", "cut.mcap"]
@@ -47,6 +48,10 @@ def test_one_that_fails_does_not_stop_the_others(
     assert call("batch", "evaluate", tmp_path / "out" / "[ab].mcap", "--align", "-o", tmp_path / "figures") == 0
     assert "2 done" in capsys.readouterr().out
     jsonschema.validate(json.loads((tmp_path / "figures" / "a.json").read_text()), schema_of("evaluate"))
+    again = ("batch", "evaluate", tmp_path / "out" / "a.mcap", "--align", "-o", tmp_path / "figures")
+    assert call(*again) == 2
+    assert "replace it with --overwrite" in capsys.readouterr().err
+    assert call(*again, "--overwrite") == 0
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ import jsonschema
 import pytest
 from mcap_landmarks.resources import resource
 
-from tests.cli.calls import call
+from tests.cli.calls import call, schema_of
 
 
 def test_what_is_in_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -21,9 +21,15 @@ def test_what_is_in_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert {shown[stage]["method"] for stage in ("detect", "cluster", "fuse", "build_map", "localize")} == {"thesis"}
     assert call(*words, "--json") == 0
     document = json.loads(capsys.readouterr().out)
-    jsonschema.validate(document, json.loads(resource("schemas", "json/config_show.schema.json").read_text()))
+    jsonschema.validate(document, schema_of(document["schema"].split("/")[1]))
     assert document["config"]["detect"]["iou"] == 0.6
     assert document["config"]["detect"]["model"] is None
+
+
+def test_documents_are_named_as_their_schemas() -> None:
+    for path in resource("schemas", "json").glob("*.schema.json"):
+        named = json.loads(path.read_text()).get("properties", {}).get("schema", {}).get("const")
+        assert named in {None, f"mcap-landmarks/{path.name.removesuffix('.schema.json')}/1"}, path
 
 
 def test_an_unknown_key_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:

@@ -124,7 +124,7 @@ def test_bad_input_is_refused_in_one_line(tmp_path: Path, capsys: pytest.Capture
         (UNUSABLE, "is not an MCAP file", (tmp_path / "words.mcap", "-o", target)),
         (UNUSABLE, "is empty (0 bytes); record or copy", (tmp_path / "empty.bag", "-o", target)),
         (USAGE, "does not exist; create it first", (source, "-o", tmp_path / "none" / "a.mcap")),
-        (USAGE, "is part of the input", (source, "-o", source)),
+        (USAGE, "is the input itself", (source, "-o", source)),
         (USAGE, "--start yesterday: give RFC 3339", (source, "--start", "yesterday", "-o", target)),
         (USAGE, "matches none of /scan, /talk", (source, "--topics", "scan", "-o", target)),
     ]
@@ -148,8 +148,12 @@ def test_an_output_that_exists_is_replaced_whole_or_not_at_all(tmp_path: Path) -
     target = tmp_path / "out.mcap"
     assert run(write_ros1(tmp_path / "a.bag"), "-o", target) == DONE
     before = target.read_bytes()
-    assert run(write_plain_db3(tmp_path / "b.db3"), "-o", target) == UNUSABLE
+    assert run(tmp_path / "a.bag", "-o", target) == DONE
     assert target.read_bytes() == before
-    assert run(write_ros2(tmp_path / "c"), "-o", target) == DONE
+    other, unknown = write_ros2(tmp_path / "c"), write_plain_db3(tmp_path / "b.db3")
+    assert run(other, "-o", target) == USAGE
+    assert run(unknown, "-o", target, "--overwrite") == UNUSABLE
+    assert target.read_bytes() == before
+    assert run(other, "-o", target, "--overwrite") == DONE
     with open_recording(target) as recording:
         assert sum(entry.count for entry in recording.channels) == 40

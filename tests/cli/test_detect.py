@@ -15,6 +15,7 @@ from mcap_landmarks.messages.annotations import ImageAnnotations
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
+from mcap_landmarks.moments import moment
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.resources import resource
 from mcap_landmarks.stage import Channel, Stamped
@@ -157,7 +158,7 @@ def test_a_corrupt_image_is_a_loss(tmp_path: Path, model: Path, capsys: pytest.C
     document = json.loads(capsys.readouterr().out)
     jsonschema.validate(document, SCHEMA)
     assert (document["images"], document["unreadable"]) == (5, 2)
-    assert document["losses"][0] == f"{CAMERA_IMAGE.topic} at {2 * SECOND}: the JPEG of 100 bytes is cut short"
+    assert document["losses"][0] == f"{CAMERA_IMAGE.topic} at {moment(2 * SECOND)}: the JPEG of 100 bytes is cut short"
     assert "2 messages could not be decoded in all" in document["losses"][1]
     assert topics(tmp_path / "out.mcap") == {CAMERA_IMAGE.topic: 5, DETECTIONS.topic: 3, "/camera/annotations": 3}
     poor = write(tmp_path / "poor.mcap", [content[1]])

@@ -18,6 +18,7 @@ from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.resources import resource
 from mcap_landmarks.stage import Channel, Stamped
 
+from tests.cli.calls import schema_of
 from tests.cli.logs import write
 from tests.runs.chain import raw_log, raw_messages
 from tests.sources.bags import write_mrclam, write_plain_db3, write_ros1, write_ros2
@@ -138,7 +139,7 @@ def test_a_log_without_messages_says_so(tmp_path: Path, capsys: pytest.CaptureFi
 def test_what_is_no_log_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(tmp_path / "none", "--json") == UNUSABLE
     out, err = capsys.readouterr()
-    assert out == ""
+    jsonschema.validate(json.loads(out), schema_of("error"))
     assert err == f"error: {tmp_path}/none: there is no such file or folder; check the path\n"
 
 

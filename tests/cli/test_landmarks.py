@@ -42,8 +42,8 @@ def test_what_a_format_leaves_out_is_said(tmp_path: Path, capsys: pytest.Capture
     assert run("export", tmp_path / "m.db", tmp_path / "m.csv") == DONE
     assert run("export", tmp_path / "m.db", tmp_path / "m.txt") == DONE
     assert capsys.readouterr().err.splitlines() == [
-        "note: 1 tentative landmarks are left out; JSON holds them",
-        "note: 1 landmarks in no group are left out; CSV and JSON hold them",
+        "note: 1 tentative landmark left out; JSON holds all",
+        "note: 1 landmark in no group left out; CSV and JSON hold all",
     ]
 
 
@@ -51,8 +51,8 @@ def test_files_are_not_replaced_unasked(tmp_path: Path, capsys: pytest.CaptureFi
     write_map(tmp_path / "m.db", small_map())
     assert run("import", tmp_path / "m.db", APPENDIX_C) == USAGE
     assert len(read_map(tmp_path / "m.db")) == 4
-    assert "exists; name another file, or replace it with --force" in capsys.readouterr().err
-    assert run("import", tmp_path / "m.db", APPENDIX_C, "--force") == DONE
+    assert "write to another file, or replace it with --overwrite" in capsys.readouterr().err
+    assert run("import", tmp_path / "m.db", APPENDIX_C, "--overwrite") == DONE
     assert len(read_map(tmp_path / "m.db")) == 60
 
 

@@ -192,7 +192,8 @@ def test_cameras_whose_topics_do_not_lie_apart_are_told_by_their_frames(
     assert len(last_scene(out)[0]) == len(STANDING)
     assert topics(out)["/image_front/annotations"] == COUNT
     assert topics(out)["/image_left/annotations"] == 1
-    assert call("detect", log, "-o", out, "--model", here / "model.onnx", "--image", "/image_left") == 3
+    words = ("detect", log, "-o", out, "--overwrite", "--model", here / "model.onnx", "--image", "/image_left")
+    assert call(*words) == 3
     assert call("fuse", here / "out.mcap", "-o", here / "no.mcap") == 1  # there are no scan objects yet
 
 

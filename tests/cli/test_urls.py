@@ -25,6 +25,7 @@ LINES = {
     "diff": "diff {baseline} {candidate} --reference {reference}",
     "evaluate": "evaluate {result} --reference {reference} --tum {tum} --thesis {thesis}",
     "explain": "explain {result} --at 1 -o {output}",
+    "export": "export {result} --format tum -o {output}",
     "fuse": "fuse {logs} -o {output} --extrinsics {extrinsics} --config {config_file}",
     "generate": "generate small -o {output}",
     "info": "info {paths}",
@@ -112,7 +113,7 @@ def test_a_url_is_refused_as_it_was_written(
     url = f"https://host.example/a//x.{ending}?version=2"
     given = {**files, "output": files["output"].with_suffix(f".{ending}"), name: url}
     words = LINES[verb].format_map(given).replace("LOG", str(files["logs"])).split()
-    forced = ["--force"] if verb.startswith("landmarks ") and "show" not in verb else []
+    forced = ["--overwrite"] if verb.startswith("landmarks ") and "show" not in verb else []
     line = refused(capsys, 2, *words, *forced)
     assert line.startswith(f"error: {url}: URLs cannot be ")
     assert line.endswith(("read yet; download it first", "written yet; write to a file and upload that"))

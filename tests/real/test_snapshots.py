@@ -55,7 +55,7 @@ def errors_m(result: Path) -> Array:
 
 def test_snapshots(shared_data: Path, tmp_path: Path) -> None:
     log, database, out = tmp_path / "log.mcap", tmp_path / "map.db", tmp_path / "out.mcap"
-    words = ["localize", str(log), "--map", str(database), "-o", str(out)]
+    words = ["localize", str(log), "--map", str(database), "-o", str(out), "--overwrite"]
     for setting in ("robust_dof=3", "max_sigma_m=10", "max_sigma_deg=180", "consistency=0"):
         words += ["--set", f"localize.{setting}"]
     found = []

@@ -63,6 +63,25 @@ def test_ctrl_c_lets_the_running_ones_clean_up_and_starts_no_more(tmp_path: Path
     assert not never.exists()
 
 
+def test_a_request_to_end_is_handed_on(tmp_path: Path) -> None:
+    """SIGTERM, as `docker stop` sends it, of which the command makes an exit."""
+    gate, cleaned = tmp_path / "gate", tmp_path / "cleaned"
+    os.mkfifo(gate)
+    running = (
+        "import signal, sys\n"
+        "signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))\n"
+        f"try:\n    open({str(gate)!r}, 'w').close()\n    signal.pause()\n"
+        f"finally:\n    open({str(cleaned)!r}, 'w').close()"
+    )
+
+    def terminate(_: int) -> None:
+        raise SystemExit(143)
+
+    with pytest.raises(SystemExit):
+        run_tasks([task(running), task(f"open({str(gate)!r}).read()")], 2, terminate)
+    assert cleaned.exists()
+
+
 def test_patterns_and_names_give_each_log_once(tmp_path: Path) -> None:
     for name in ("b.mcap", "a.mcap", "deep/c.mcap", "x[1].mcap"):
         (tmp_path / name).parent.mkdir(exist_ok=True)

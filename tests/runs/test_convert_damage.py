@@ -62,7 +62,7 @@ def test_the_input_is_never_the_output(tmp_path: Path) -> None:
     source = tmp_path / "a.mcap"
     one(write_ros1(tmp_path / "a.bag"), source)
     before = source.read_bytes()
-    with pytest.raises(UsageError, match="is part of the input"):
+    with pytest.raises(UsageError, match="is the input itself"):
         run(source, source)
     assert source.read_bytes() == before
     folder = write_ros2(tmp_path / "bag", storage="mcap")

@@ -142,7 +142,7 @@ def test_without_static_transforms_the_others_hold(here: Path) -> None:
     assert {"base_scan", "camera", "mast", "wheel"} <= frames
     beside = Stamped(TF_STATIC, 5, TFMessage((Transform.planar(5, ("base_footprint", "arm"), np.zeros(3)),)))
     write_log(here / "log.mcap", [*moved[:6], beside, *moved[6:]])
-    cut(here, "log.mcap", "out.mcap")
+    cut(here, "log.mcap", "out.mcap", overwrite=True)
     assert "mast" not in str(of_topic(here / "out.mcap", TF.topic))
 
 

@@ -142,7 +142,7 @@ def test_another_model_or_program_runs_anew(here: Path, monkeypatch: pytest.Monk
 def test_another_recording_of_the_same_name_runs_anew(here: Path) -> None:
     run_stages(asked(here), here / "out.mcap", ["detect"], "run")
     raw_log(here / "log.mcap", COUNT - 1)
-    run = run_stages(asked(here), here / "out.mcap", ["detect"], "run")
+    run = run_stages(asked(here, overwrite=True), here / "out.mcap", ["detect"], "run")
     assert "the recording" in reasons(run)["detect"]
     assert topics(here / "out.mcap")[DETECTIONS.topic] == COUNT - 1
 

@@ -41,7 +41,7 @@ def test_broken_bytes(name: str, edits: list[Edit], kept: float, bags: Path, tmp
     path.write_bytes(data[: int(len(data) * kept)])
     with contextlib.suppress(RecordingError):
         (done,) = convert(
-            [path], tmp_path / "o.mcap", Selection(), {"rosbag2": {"distro": "humble"}}, unwatched
+            [path], tmp_path / "o.mcap", Selection(), {"rosbag2": {"distro": "humble"}}, unwatched, overwrite=True
         ).outputs
         assert done.lost or done.losses or done.topics.total() >= WHOLE[name]
 
@@ -50,5 +50,5 @@ def test_a_bag_that_is_all_damage_leaves_no_output(bags: Path, tmp_path: Path) -
     path = tmp_path / "a.bag"
     path.write_bytes((bags / "bz2.bag").read_bytes()[:4117] + b"\xff" * 3000)
     with pytest.raises(RecordingError, match=r"a\.bag"):
-        convert([path], tmp_path / "o.mcap", Selection(), {}, unwatched)
+        convert([path], tmp_path / "o.mcap", Selection(), {}, unwatched, overwrite=True)
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.bag"]

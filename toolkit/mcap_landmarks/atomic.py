@@ -1,7 +1,11 @@
-"""Output files that appear whole or not at all."""
+"""Output files that appear whole or not at all, each written by one process at a time."""
 
 import contextlib
+import errno
+import fcntl
 import os
+import re
+import secrets
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,19 +14,61 @@ from typing import BinaryIO
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.locations import Location, to_write
 
+_NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP}
+"""What systems say whose files cannot be locked (flock(2), some network file systems)."""
+_held: set[Path] = set()
+"""The targets that this process holds."""
+
 
 def check_target(target: Location) -> Path:
-    """The path of a target; refuses one that cannot become a regular file.
+    """The path of a target; refuses one that cannot become a regular file. A link stands for what it leads to.
 
     Raises:
         UsageError: it is not on this machine, its folder does not exist, or what has its name is no regular file.
     """
     path = to_write(target)
-    if not path.parent.is_dir():
-        raise UsageError(f"{path}: the folder {path.parent} does not exist; create it first")
-    if path.exists() and not stat.S_ISREG(path.stat().st_mode):
+    real = _real(path)
+    if not real.parent.is_dir():
+        raise UsageError(f"{path}: the folder {real.parent} does not exist; create it first")
+    try:
+        mode = real.lstat().st_mode
+    except FileNotFoundError:
+        return path
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
+    if not stat.S_ISREG(mode):
         raise UsageError(f"{path} is not a regular file; name a file that may be written")
     return path
+
+
+@contextlib.contextmanager
+def held(target: Location) -> Iterator[Path]:
+    """Keep every other process from writing a target while the block runs; the path that it has behind links.
+
+    The lock ends with the process, however that ends. What a killed process left half written is removed.
+
+    Raises:
+        UsageError: see `check_target`.
+        RecordingError: another process holds it, the disk is full, or the folder may not be written.
+    """
+    path = _real(check_target(target))
+    if path in _held:
+        yield path
+        return
+    with _failing_as(target):
+        descriptor = _lock(path)
+    if descriptor is None:
+        raise RecordingError(f"{target}: another run writes to it; wait until that ends, or write to another file")
+    _held.add(path)
+    try:
+        with _failing_as(target):
+            _remove_left_over(path)
+        yield path
+    finally:
+        _held.discard(path)
+        with contextlib.suppress(OSError):
+            _lock_file(path).unlink()  # while it is held, so that no other process holds what is removed
+        os.close(descriptor)
 
 
 @contextlib.contextmanager
@@ -30,19 +76,63 @@ def atomic_file(target: Location) -> Iterator[BinaryIO]:
     """A file to write that takes the name `target` when the block ends well and vanishes when it does not.
 
     Raises:
-        UsageError: see `check_target`.
-        RecordingError: the disk is full, or the folder may not be written.
+        UsageError, RecordingError: see `held`.
     """
-    path = check_target(target)
-    partial = path.with_name(f".{path.name}.partial")
+    with held(target) as path, _failing_as(target):
+        partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial")
+        try:
+            with partial.open("xb") as stream:
+                yield stream
+                stream.flush()
+                os.fsync(stream.fileno())
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+def _real(path: Path) -> Path:
+    return Path(os.path.realpath(path))
+
+
+def _lock_file(path: Path) -> Path:
+    return path.with_name(f".{path.name}.lock")
+
+
+def _lock(path: Path) -> int | None:
+    """An open file that is locked for as long as it is open; None if another process has locked it."""
+    name = _lock_file(path)
+    while True:
+        descriptor = os.open(name, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.path.samestat(os.fstat(descriptor), name.stat()):
+                return descriptor
+        except BlockingIOError:
+            os.close(descriptor)
+            return None
+        except FileNotFoundError:  # whoever held it removed it after it was opened here
+            pass
+        except OSError as error:
+            if error.errno in _NO_LOCKS:
+                return descriptor
+            os.close(descriptor)
+            raise
+        os.close(descriptor)
+
+
+def _remove_left_over(path: Path) -> None:
+    """Remove what processes left half written that were killed: who writes now holds the target."""
+    left_over = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{8}}\.partial")
+    for entry in list(path.parent.iterdir()):
+        if left_over.fullmatch(entry.name):
+            entry.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _failing_as(target: Location) -> Iterator[None]:
+    """Turn what the system says into one error."""
     try:
-        with partial.open("wb") as stream:
-            yield stream
-            stream.flush()
-            os.fsync(stream.fileno())
-        partial.replace(path)
+        yield
     except OSError as error:
         reason = error.strerror or str(error)
-        raise RecordingError(f"{path}: cannot be written ({reason}); free space or choose another place") from error
-    finally:
-        partial.unlink(missing_ok=True)
+        raise RecordingError(f"{target}: cannot be written ({reason}); free space or choose another place") from error

@@ -182,6 +182,16 @@ def _check_given(stage: Stage, names: Collection[str]) -> None:
             raise UsageError(f"{stage.name} needs a {name}; give --{name} FILE or --set {stage.name}.{name}=FILE")
 
 
+def named_files(settings: Settings) -> dict[str, Location]:
+    """The files that settings name, such as `detect.model`, by the setting."""
+    return {
+        f"{name}.{key}": location(str(table[key]))
+        for name, table in settings.items()
+        for key in declaration(name).files
+        if key in table
+    }
+
+
 def load(name: str, settings: Settings) -> Config:
     """The configuration of a stage by name."""
     return stage_config(find_stage(name).config, name, settings.get(name, {}))

@@ -74,14 +74,16 @@ def location(text: str | Path) -> Location:
 
 
 def to_read(place: Location) -> Path:
-    """The path of a file or folder, for what reads paths only.
+    """The path of a file or folder, for what reads paths only; one that does not exist is refused by who opens it.
 
     Raises:
-        UsageError: it is not on this machine.
+        UsageError: it is not on this machine, or it is a pipe or device, which could not be read twice.
     """
-    if isinstance(place, Path):
-        return place
-    raise UsageError(f"{place}: URLs cannot be read yet; download it first")
+    if not isinstance(place, Path):
+        raise UsageError(f"{place}: URLs cannot be read yet; download it first")
+    if place.exists() and not (place.is_file() or place.is_dir()):
+        raise UsageError(f"{place} is neither a file nor a folder; save what it gives to a file first")
+    return place
 
 
 def to_write(place: Location) -> Path:

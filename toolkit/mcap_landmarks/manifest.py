@@ -11,7 +11,7 @@ from typing import TypedDict
 
 from mcap_landmarks import __version__
 from mcap_landmarks.errors import ToolkitError
-from mcap_landmarks.locations import Location
+from mcap_landmarks.locations import Location, to_read
 
 RUN = "mcap-landmarks.run"
 """Name of the metadata record that holds the manifest."""
@@ -255,7 +255,7 @@ def file_hash(path: Location, progress: Callable[[int], None] | None = None) -> 
     """
     digest = hashlib.sha256()
     try:
-        with path.open("rb") as stream:
+        with to_read(path).open("rb") as stream:
             while block := stream.read(1 << 20):
                 digest.update(block)
                 if progress:

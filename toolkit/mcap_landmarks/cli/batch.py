@@ -16,6 +16,8 @@ from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from mcap_landmarks.runs.batch import Ended, Task
 
 context_settings = {"allow_extra_args": True, "ignore_unknown_options": True}
@@ -26,11 +28,11 @@ _SUFFIX = {
 }
 _ONE_FILE = {"map": ("--map",), "evaluate": ("--tum", "--thesis")}
 _DETECTS = ("detect", "map", "localize", "run")
-_CALL = (sys.executable, "-c", "from mcap_landmarks.cli.main import run; run()")
+_CALL = (sys.executable, "-m", "mcap_landmarks")
 
 
 class _Report(TypedDict):
-    """What became of one log; `result` is the verb's own document, None if it failed."""
+    """What became of one log; `result` is the verb's own document, or that of its error; None if it gave none."""
 
     log: str
     output: str | None
@@ -60,11 +62,13 @@ def command(
     Options of VERB pass through: batch localize 'logs/*.mcap' --map m.db -o out --set localize.max_sigma_m=0.3
     """
     from mcap_landmarks.runs.batch import run_tasks
+    from mcap_landmarks.runs.outputs import no_empty_folder
 
-    tasks = _tasks(verb, words, output)
-    count = min(workers or len(os.sched_getaffinity(0)), len(tasks))
-    with progress(verb, len(tasks), "logs") as advance:
-        reports = [_report(verb, ended) for ended in run_tasks(tasks, count, advance)]
+    with no_empty_folder(output):
+        tasks = _tasks(verb, words, output)
+        count = min(workers or len(os.sched_getaffinity(0)), len(tasks))
+        with progress(verb, len(tasks), "logs") as advance:
+            reports = [_report(verb, ended) for ended in run_tasks(tasks, count, advance)]
     for report in reports:
         for line in (*report["notes"], *report["errors"]):
             warn(line)
@@ -95,13 +99,23 @@ def _tasks(verb: str, words: Sequence[str], output: Location) -> "list[Task]":
         raise UsageError(f"batch {verb}: name the logs, or a quoted pattern such as 'logs/*.mcap'")
     if verb in _DETECTS:
         passed = ["--set", "detect.threads=1", *passed]
-    folder = make_folder(output)
+    logs = find_logs(patterns)
     tasks = []
-    for log, target in outputs_in(folder, find_logs(patterns), _SUFFIX[verb]).items():
+    for log, target in outputs_in(make_folder(output), logs, _SUFFIX[verb]).items():
         where = {"map": ["--map", str(target)], "evaluate": []}.get(verb, ["-o", str(target)])
         tasks.append(Task(log, target, (*_CALL, verb, str(log), *where, "--json", *passed)))
     own.make_context(verb, list(tasks[0].command[len(_CALL) + 1 :]))
+    if verb == "evaluate":
+        _check_documents(tasks, logs, overwrite="--overwrite" in passed)
     return tasks
+
+
+def _check_documents(tasks: "Sequence[Task]", logs: "Sequence[Path]", *, overwrite: bool) -> None:
+    """Refuse to replace what is there by the documents that are kept here, before anything runs."""
+    from mcap_landmarks.runs.replacing import new_files
+
+    with new_files([task.output for task in tasks], logs, overwrite=overwrite):
+        pass
 
 
 def _command_of(verb: str) -> TyperCommand:
@@ -150,8 +164,16 @@ def _report(verb: str, ended: "Ended") -> _Report:
         "exit_code": ended.exit_code,
         "errors": errors or ([_last_words(verb, ended)] if failed else []),
         "notes": [line for line in lines if line.startswith(("note: ", "warning: "))],
-        "result": None if failed else json.loads(ended.stdout),
+        "result": _document(ended),
     }
+
+
+def _document(ended: "Ended") -> object:
+    """What a process printed, None if it was killed before that was whole."""
+    try:
+        return json.loads(ended.stdout)
+    except ValueError:
+        return None
 
 
 def _last_words(verb: str, ended: "Ended") -> str:

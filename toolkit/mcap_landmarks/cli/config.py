@@ -21,7 +21,7 @@ def show(
 
     tables = everything(gather(config_file, settings or [], method))
     if json:
-        say_json("config", {"config": tables})
+        say_json("config_show", {"config": tables})
     else:
         say(toml(tables).rstrip())
 

@@ -4,31 +4,108 @@ import contextlib
 import json
 import math
 import os
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from types import FrameType
 
 from mcap_landmarks.errors import ToolkitError
 
-DONE, UNUSABLE, USAGE, PARTIAL, INTERRUPTED = 0, 1, 2, 3, 130
-"""Exit codes: 2 is also what the shell's own tools mean by wrong usage, and 130 what it gives after Ctrl-C."""
+DONE, UNUSABLE, USAGE, PARTIAL, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
+"""Exit codes: 2 is also what the shell's own tools mean by wrong usage, 130 and 143 its own of Ctrl-C and SIGTERM."""
+_HELP = "see mcap-landmarks --help"
+_STOPPED = "interrupted; nothing unfinished was left behind, and the next run goes on from finished stages"
 
 
-def run_command(application: Callable[..., object], arguments: Sequence[str]) -> int:
-    """Run a typer application and turn what it raises into one line on stderr and an exit code."""
+def run_command(application: Callable[..., object], arguments: Sequence[str], help_line: str = _HELP) -> int:
+    """Run a typer application and turn what it raises into one line on stderr and an exit code.
+
+    With --json among the arguments there is a document, too; `help_line` is the remedy where an error names none.
+    """
+
+    def fail(code: int, message: str, line: str | None) -> int:
+        if line:
+            warn(line)
+        if "--json" in arguments:
+            what, remedy = told_apart(message)
+            say_json("error", {"error": what, "remedy": remedy or help_line})
+        return code
+
     try:
-        application(arguments, standalone_mode=True)
-    except ToolkitError as error:
-        warn(f"error: {error}")
-        return error.exit_code
+        code = _exit_code(application, arguments, fail)
+        sys.stdout.flush()
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
-    except (SystemExit, KeyboardInterrupt) as stop:
-        if isinstance(stop, KeyboardInterrupt) or stop.code == INTERRUPTED:  # typer makes the one of the other
-            warn("interrupted; nothing unfinished was left behind, and the next run goes on from finished stages")
-            return INTERRUPTED
-        return stop.code if isinstance(stop.code, int) else DONE
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        warn(f"error: the output cannot be printed ({error.strerror}); free space or send it elsewhere")
+        return UNUSABLE
+    return code
+
+
+def _exit_code(
+    application: Callable[..., object], arguments: Sequence[str], fail: Callable[[int, str, str | None], int]
+) -> int:
+    try:
+        application(arguments, standalone_mode=True)
+    except ToolkitError as error:
+        return fail(error.exit_code, str(error), f"error: {error}")
+    except KeyboardInterrupt:
+        return fail(INTERRUPTED, _STOPPED, _STOPPED)
+    except SystemExit as stop:
+        if stop.code in {
+            INTERRUPTED,
+            TERMINATED,
+        }:  # typer makes the former of Ctrl-C, the latter is of `heeding_signals`
+            return fail(int(stop.code), _STOPPED, _STOPPED)
+        code = stop.code if isinstance(stop.code, int) else DONE
+        wrong_usage = getattr(
+            stop.__context__, "format_message", None
+        )  # typer printed it, and exits while it handles it
+        return fail(code, wrong_usage(), None) if wrong_usage else code
     return DONE
+
+
+def told_apart(message: str) -> tuple[str, str]:
+    """What was wrong, and what to do about it: messages are written as `what; remedy`; the latter may be missing."""
+    what, semicolon, remedy = message.rpartition("; ")
+    while semicolon and remedy.count("(") != remedy.count(")"):  # within a remark
+        what, semicolon, more = what.rpartition("; ")
+        remedy = f"{more}; {remedy}"
+    return (what, remedy) if semicolon else (message, "")
+
+
+@contextlib.contextmanager
+def heeding_signals() -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM end what runs in the block as an exception does, so that everything is cleaned up."""
+    ways = {signal.SIGINT: _interrupt, signal.SIGTERM: _terminate}
+    before = {number: signal.getsignal(number) for number in ways}
+    heeded = [number for number, how in before.items() if how is not signal.SIG_IGN]
+    if threading.current_thread() is not threading.main_thread():
+        heeded = []
+    for number in heeded:
+        signal.signal(number, ways[number])
+    try:
+        yield
+    finally:
+        for number in heeded:
+            signal.signal(number, before[number])
+
+
+class _Interrupted(KeyboardInterrupt):
+    """Ctrl-C. Of a plain KeyboardInterrupt that passes through `exec`, as dataclasses use it, CPython keeps in mind to
+    kill its process at the end (`_Py_UnhandledKeyboardInterrupt`), whoever caught it.
+    """
+
+
+def _interrupt(_number: int, _frame: FrameType | None) -> None:
+    raise _Interrupted
+
+
+def _terminate(_number: int, _frame: FrameType | None) -> None:
+    raise SystemExit(TERMINATED)
 
 
 def warn(text: str) -> None:

@@ -7,6 +7,7 @@ import typer
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, warn
 from mcap_landmarks.locations import Location, location
+from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.conversion import Converted
@@ -31,6 +32,7 @@ def command(
     ] = None,
     config_file: options.ConfigFile = None,
     settings: options.Set = None,
+    overwrite: options.Overwrite = False,
     json: options.Json = False,
 ) -> None:
     """Convert SRC... to MCAP with every message, or tell which ones were lost.
@@ -46,7 +48,8 @@ def command(
     if distro:
         chosen.setdefault("rosbag2", {})["distro"] = distro
     selection = Selection(tuple(topics or ()), options.time_ns(start, "--start"), options.time_ns(end, "--end"))
-    conversion = convert(inputs, output, selection, chosen, progress)
+    beside = [config_file] if config_file else []
+    conversion = convert(inputs, output, selection, chosen, progress, beside=beside, overwrite=overwrite)
     for done in conversion.outputs:
         _report(done)
     for failure in conversion.failures:
@@ -72,8 +75,7 @@ def _report(done: "Converted") -> None:
 
 def _print(conversion: "Conversion") -> None:
     for done in conversion.outputs:
-        topics = f"{len(done.topics)} topic{'s' if len(done.topics) != 1 else ''}"
-        say(f"{done.path}: {done.topics.total()} messages, {topics}")
+        say(f"{done.path}: {counted(done.topics.total(), 'message')}, {counted(len(done.topics), 'topic')}")
 
 
 def _document(conversion: "Conversion") -> dict[str, object]:

@@ -12,6 +12,7 @@ from mcap_landmarks.cli.console import DONE, USAGE, progress, say, say_json, tab
 from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.locations import Location, location, size_of
 from mcap_landmarks.moments import moment
+from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
     from mcap_landmarks.diff.comparison import Diff
@@ -103,9 +104,9 @@ def _print(document: "DiffDocument") -> None:
     if document["identical"]:
         say("same: the files are equal byte by byte")
     elif document["verdict"] == "same":
-        say(f"same: {_many(len(channels), 'channel')}, nothing beyond tolerance")
+        say(f"same: {counted(len(channels), 'channel')}, nothing beyond tolerance")
     else:
-        say(f"different: {len(touched)} of {_many(len(channels), 'channel')}")
+        say(f"different: {len(touched)} of {counted(len(channels), 'channel')}")
     _print_rows("meant to differ", ((row["key"], row["baseline"], row["candidate"]) for row in document["manifest"]))
     structure = document["structure"]
     _print_rows("structure", ((f"{row['what']} {row['name']}", row["baseline"], row["candidate"]) for row in structure))
@@ -242,7 +243,3 @@ def _difference(field: str, value: float) -> str:
 
 def _number(value: float | None) -> str:
     return "-" if value is None else str(value) if isinstance(value, int) else f"{value:.6g}"
-
-
-def _many(count: int, word: str) -> str:
-    return f"{count} {word}" if count == 1 else f"{count} {word}s"

@@ -50,27 +50,26 @@ def command(
         Location | None,
         typer.Option("--thesis", parser=location, help="Write the scored positions as the thesis's Appendix D."),
     ] = None,
+    overwrite: options.Overwrite = False,
     json: options.Json = False,
 ) -> None:
     """Measure poses and map of RESULT against the truth: metres, degrees, false ones, honesty of the covariance.
 
     The truth is RESULT's own /ground_truth channels, or those of --reference.
     """
-    from mcap_landmarks.atomic import check_target
     from mcap_landmarks.evaluation.read import read_reference, read_run
+    from mcap_landmarks.runs.replacing import new_files
 
-    for target in (tum, thesis):
-        if target is not None:
-            check_target(target)
-    with progress(f"read {result.name}", size_of(result) or None) as advance:
-        run, truth, losses = read_run(result, advance)
-    if reference is not None:
-        other, more = read_reference(reference)
-        truth, losses = other.over(truth), losses + more
-    _check(result, run, truth)
-    pairing = _pairing(association, max_gap)
-    document = _evaluated(result, run, truth, pairing, aligned=align)
-    _export(run, truth, pairing, tum, thesis)
+    with new_files([tum, thesis], [result, reference], overwrite=overwrite):
+        with progress(f"read {result.name}", size_of(result) or None) as advance:
+            run, truth, losses = read_run(result, advance)
+        if reference is not None:
+            other, more = read_reference(reference)
+            truth, losses = other.over(truth), losses + more
+        _check(result, run, truth)
+        pairing = _pairing(association, max_gap)
+        document = _evaluated(result, run, truth, pairing, aligned=align)
+        _export(run, truth, pairing, tum, thesis)
     if document["localized"] and not document["scored"] and truth.trajectory is not None:
         warn(f"note: {result}: no pose has a truth near enough in time; see --max-gap and --association")
     if json:

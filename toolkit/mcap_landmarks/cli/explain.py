@@ -10,6 +10,7 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, say_json, table
 from mcap_landmarks.locations import Location, location
 from mcap_landmarks.moments import moment
+from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
     from mcap_landmarks.evaluation.explain import Place, Situation
@@ -30,34 +31,49 @@ def command(
             "-o", "--output", parser=location, help="Draw it, too: image, scan or cloud, map (.png, .svg, .pdf)."
         ),
     ] = None,
+    overwrite: options.Overwrite = False,
     json: options.Json = False,
 ) -> None:
     """Say what was detected, clustered and fused at TIME, which places of the map came into question, and which
     condition of a match held or failed, by how much.
     """
-    from mcap_landmarks.atomic import atomic_file, check_target
+    from contextlib import ExitStack
+
     from mcap_landmarks.evaluation.explain import places_of
     from mcap_landmarks.report.explain_reading import read_situation
     from mcap_landmarks.report.plots import form_of
+    from mcap_landmarks.runs.replacing import earlier_picture, output_to
 
-    form = form_of(output) if output else ""
     if output:
-        check_target(output)
-    situation, view = read_situation(result, options.time_ns(at, "--at") or 0)
-    places = places_of(situation)
-    if output:
-        from functools import partial
-
-        from mcap_landmarks.report.explain_picture import explanation_figure
-        from mcap_landmarks.report.plots import save
-
-        title = f"{result.name} at {moment(situation.stamp_ns)}: {_status(situation)}"
-        with atomic_file(output) as stream:
-            save(partial(explanation_figure, situation, places, view, title), stream, form)
+        form_of(output)
+    with ExitStack() as stack:
+        if output:
+            earlier = earlier_picture("explain", [result])
+            stack.enter_context(output_to(output, [result], earlier, overwrite=overwrite))
+        situation, view = read_situation(result, options.time_ns(at, "--at") or 0)
+        places = places_of(situation)
+        if output:
+            _draw(result, situation, places, view, output)
     if json:
         say_json("explain", _document(situation, places, view))
     else:
         _print(situation, places, view)
+
+
+def _draw(
+    result: Location, situation: "Situation", places: "tuple[Place, ...]", view: "SensorData", output: Location
+) -> None:
+    from functools import partial
+
+    from mcap_landmarks.atomic import atomic_file
+    from mcap_landmarks.report.explain_picture import explanation_figure
+    from mcap_landmarks.report.plots import form_of, save
+    from mcap_landmarks.runs.replacing import picture_mark
+
+    title = f"{result.name} at {moment(situation.stamp_ns)}: {_status(situation)}"
+    with atomic_file(output) as stream:
+        draw = partial(explanation_figure, situation, places, view, title)
+        save(draw, stream, form_of(output), picture_mark("explain", [result]))
 
 
 def _status(situation: "Situation") -> str:
@@ -70,7 +86,7 @@ def _print(situation: "Situation", places: "tuple[Place, ...]", view: "SensorDat
 
     match = situation.match
     before = match.bundles_joined - 1 if match is not None else 0
-    joined = f", judged together with what {before} bundles before it saw" if before > 0 else ""
+    joined = f", judged together with what {counted(before, 'bundle')} before it saw" if before > 0 else ""
     say(f"bundle at {moment(situation.stamp_ns)}: {_status(situation)}{joined}")
     for line in sensed_lines(situation, view):
         say(line)

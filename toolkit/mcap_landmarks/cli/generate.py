@@ -11,6 +11,7 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import progress, say, say_json, table, warn
 from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.locations import Location, location
+from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
     from mcap_landmarks_generator.checks import Staged
@@ -31,6 +32,7 @@ def command(
     workers: Annotated[
         int | None, typer.Option("--workers", min=1, help="Processes that render; as many as cores by default.")
     ] = None,
+    overwrite: options.Overwrite = False,
     list_scenarios: Annotated[bool, typer.Option("--list", help="List the bundled scenarios and exit.")] = False,
     json: options.Json = False,
 ) -> None:
@@ -45,11 +47,14 @@ def command(
         raise UsageError(
             "name a scenario and where to write: mcap-landmarks generate SCENARIO -o LOG.mcap (see --list)"
         )
+    from mcap_landmarks.runs.replacing import check_apart, generated_recording, output_to
+
     target = check_target(output)
+    check_apart([target], [file for file in [Path(scenario)] if file.is_file()])
     try:
         from mcap_landmarks_generator.checks import stage
         from mcap_landmarks_generator.loading import load_scenario
-        from mcap_landmarks_generator.record import record
+        from mcap_landmarks_generator.record import manifest, record
         from mcap_landmarks_generator.trajectory import expected_duration_s
     except ModuleNotFoundError as error:
         raise ToolkitError(f"{error.name} is not installed: pip install 'mcap-landmarks[generator]'") from error
@@ -57,7 +62,11 @@ def command(
     staged = stage(load_scenario(scenario, settings or [], seed))
     way, factor = staged.scenario.trajectory, staged.scenario.robot.speed_factor
     seconds = round(expected_duration_s(way, staged.start, factor))
-    with progress(f"generate {staged.name}", seconds, "simulated s") as advance:
+    earlier = generated_recording(manifest(staged).entries())
+    with (
+        output_to(target, (), earlier, overwrite=overwrite),
+        progress(f"generate {staged.name}", seconds, "simulated s") as advance,
+    ):
         summary = record(staged, target, workers or os.cpu_count() or 1, advance)
     for time_s, name in summary.collisions:
         warn(f"warning: {time_s:.1f} s after the start the robot ran into {name}")
@@ -91,5 +100,5 @@ def _document(staged: "Staged", output: Path, summary: "Summary") -> dict[str, o
 
 def _print(output: Path, summary: "Summary") -> None:
     table(["topic", "messages"], [[topic, str(count)] for topic, count in sorted(summary.messages.items())])
-    collisions = f", {len(summary.collisions)} collisions" if summary.collisions else ""
+    collisions = f", {counted(len(summary.collisions), 'collision')}" if summary.collisions else ""
     say(f"{output}: {summary.simulated_s:.1f} s simulated{collisions}")

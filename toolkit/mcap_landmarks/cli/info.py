@@ -11,6 +11,7 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
 from mcap_landmarks.locations import Location, location
 from mcap_landmarks.moments import moment
+from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
     from mcap_landmarks.inspection.info import LogInfo
@@ -90,7 +91,7 @@ def _print_channels(log: "LogInfo") -> None:
         say(f"{profile}no messages")
     else:
         duration = (log.end_ns - log.start_ns) * 1e-9
-        say(f"{profile}{moment(log.start_ns)} to {moment(log.end_ns)}, {duration:.3f} s, {count} messages")
+        say(f"{profile}{moment(log.start_ns)} to {moment(log.end_ns)}, {duration:.3f} s, {counted(count, 'message')}")
     rows = [
         [
             channel.topic,

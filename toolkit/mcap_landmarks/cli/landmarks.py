@@ -6,7 +6,8 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, say_json, table, warn
-from mcap_landmarks.locations import Location, location, to_write
+from mcap_landmarks.locations import Location, location
+from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
     from mcap_landmarks.maps.exchange import Format
@@ -21,7 +22,7 @@ Form = Annotated[
     str | None,
     typer.Option("--format", metavar="thesis|csv|json", help="By default what FILE's name says: .txt, .csv, .json."),
 ]
-Replace = Annotated[bool, typer.Option("--force", help="Replace an existing file.")]
+Replace = Annotated[bool, typer.Option("--overwrite", help="Replace an existing file; never the input.")]
 
 
 @app.command("import")
@@ -32,15 +33,16 @@ def import_file(
         typer.Argument(metavar="FILE", parser=location, help="Landmarks: the thesis's Appendix C, CSV or JSON."),
     ],
     form: Form = None,
-    force: Replace = False,
+    overwrite: Replace = False,
 ) -> None:
     """Make the landmark database MAP.db from FILE."""
     from mcap_landmarks.maps.database import write_map
     from mcap_landmarks.maps.exchange import import_map
+    from mcap_landmarks.runs.replacing import new_files
 
-    _check_new(database, force=force)
-    landmark_map = import_map(file, _format(file, form))
-    write_map(database, landmark_map)
+    with new_files([database], [file], overwrite=overwrite):
+        landmark_map = import_map(file, _format(file, form))
+        write_map(database, landmark_map)
     say(f"{database}: {_size(landmark_map)}")
 
 
@@ -49,22 +51,23 @@ def export_file(
     database: Database,
     file: Annotated[Location, typer.Argument(metavar="FILE", parser=location, help="Where to write.")],
     form: Form = None,
-    force: Replace = False,
+    overwrite: Replace = False,
 ) -> None:
     """Write MAP.db to FILE: its groups as Appendix C has them, its landmarks as CSV, or everything as JSON."""
     from mcap_landmarks.maps.database import read_map
     from mcap_landmarks.maps.exchange import Format, export_map
+    from mcap_landmarks.runs.replacing import new_files
 
-    _check_new(file, force=force)
-    landmark_map, chosen = read_map(database), _format(file, form)
-    export_map(file, landmark_map, chosen)
+    with new_files([file], [database], overwrite=overwrite):
+        landmark_map, chosen = read_map(database), _format(file, form)
+        export_map(file, landmark_map, chosen)
     say(f"{file}: {_size(landmark_map)}")
     tentative = int(landmark_map.tentative.sum())
     if chosen is Format.CSV and tentative:
-        warn(f"note: {tentative} tentative landmarks are left out; JSON holds them")
+        warn(f"note: {counted(tentative, 'tentative landmark')} left out; JSON holds all")
     lone = len(landmark_map) - len({identity for group in landmark_map.groups for identity in group.landmark_ids})
     if chosen is Format.THESIS and lone:
-        warn(f"note: {lone} landmarks in no group are left out; CSV and JSON hold them")
+        warn(f"note: {counted(lone, 'landmark')} in no group left out; CSV and JSON hold all")
 
 
 @app.command()
@@ -94,7 +97,7 @@ def _print(database: Location, landmark_map: "LandmarkMap") -> None:
 
     say(f"{database}: {_size(landmark_map)} in frame {landmark_map.frame}")
     for source in landmark_map.sources:
-        used = f", {source.used} of {source.bundles} bundles used" if source.kind == "recording" else ""
+        used = f", {source.used} of {counted(source.bundles, 'bundle')} used" if source.kind == "recording" else ""
         say(f"from {source.kind} {source.fingerprint[:12]}{used}")
     sigma_m = np.sqrt(np.linalg.eigvalsh(landmark_map.covariances)[:, -1]) if len(landmark_map) else np.zeros(0)
     rows = [
@@ -121,9 +124,7 @@ def _print(database: Location, landmark_map: "LandmarkMap") -> None:
 
 def _size(landmark_map: "LandmarkMap") -> str:
     counts = [(len(landmark_map), "landmark"), (len(landmark_map.groups), "group")]
-    return (
-        " and ".join(f"{count} {name}{'' if count == 1 else 's'}" for count, name in counts if count) or "no landmarks"
-    )
+    return " and ".join(counted(count, name) for count, name in counts if count) or "no landmarks"
 
 
 def _format(file: Location, form: str | None) -> "Format":
@@ -136,10 +137,3 @@ def _format(file: Location, form: str | None) -> "Format":
         return Format(form.lower())
     except ValueError:
         raise UsageError(f"--format {form}: choose {', '.join(Format)}") from None
-
-
-def _check_new(path: Location, *, force: bool) -> None:
-    from mcap_landmarks.errors import UsageError
-
-    if to_write(path).exists() and not force:
-        raise UsageError(f"{path} exists; name another file, or replace it with --force")

@@ -12,6 +12,7 @@ from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
 from mcap_landmarks.moments import moment
+from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.bundles import Reading
@@ -73,7 +74,7 @@ def _print(runs: "list[LogRun]") -> None:
     for run in runs:
         localized = _statuses(run)["localized"]
         share = localized / max(run.outcome.bundles, 1)
-        say(f"{run.output}: {localized} bundles localized ({100 * share:.1f} %)")
+        say(f"{run.output}: {counted(localized, 'bundle')} localized ({100 * share:.1f} %)")
 
 
 def _at(log: Location, asked_ns: int, given: Given, json: bool) -> None:
@@ -133,6 +134,8 @@ def _print_moment(log: Location, asked_ns: int, answer: "Answer") -> None:
     if pose is not None and sigma_m is not None and heading_sigma_rad is not None:
         say(f"heading {math.degrees(pose[2]):.2f} deg")
         say(f"sigma {sigma_m:.3f} m, {math.degrees(heading_sigma_rad):.2f} deg")
-    say(f"{match.bundles_joined} bundles joined, {match.expected_accidental:.2g} accidental matches expected")
+    say(
+        f"{counted(match.bundles_joined, 'bundle')} joined, {match.expected_accidental:.2g} accidental matches expected"
+    )
     for name, score in zip(match.candidate_ids, match.candidate_scores.tolist(), strict=True):
         say(f"candidate {name}: {score:.3g}")

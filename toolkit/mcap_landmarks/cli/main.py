@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from mcap_landmarks.cli.console import run_command
+from mcap_landmarks.cli.console import heeding_signals, run_command
 from mcap_landmarks.cli.option_groups import spread
 from mcap_landmarks.errors import UsageError
 
@@ -79,4 +79,7 @@ def run(arguments: list[str] | None = None) -> None:
     given = sys.argv[1:] if arguments is None else arguments
     asked = next((word for word in given if not word.startswith("-")), None)
     application: Callable[..., object] = build(asked)
-    sys.exit(run_command(application, given))
+    named = f"{asked} " if asked in verbs() else ""
+    with heeding_signals():
+        code = run_command(application, given, f"see mcap-landmarks {named}--help")
+    sys.exit(code)

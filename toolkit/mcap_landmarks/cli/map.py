@@ -12,6 +12,7 @@ from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptio
 from mcap_landmarks.cli.stage_runs import Given, tell, told
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
+from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.map_results import MappedLog, MapRun
@@ -43,7 +44,7 @@ def command(
     """
     database = check_target(map_file)
     if from_reference:
-        _from_reference(logs, database, given.json)
+        _from_reference(logs, database, given)
         return
     asked = Given(given, images, scans, {"extrinsics": extrinsics}, use, ["build_map.fixed=true"] * fixed)
     run = _build(logs, database, prior, output, asked)
@@ -63,24 +64,27 @@ def _build(
 ) -> "MapRun":
     from mcap_landmarks.runs.build_map import build_map
     from mcap_landmarks.runs.map_plan import MapTask
-    from mcap_landmarks.runs.outputs import output_files
+    from mcap_landmarks.runs.outputs import no_empty_folder, output_files
 
-    targets = output_files(logs, output) if output else {}
-    return build_map(MapTask(tuple(given.requests(logs)), database, targets, prior), progress)
+    requests = tuple(given.requests(logs))
+    if output is None:
+        return build_map(MapTask(requests, database, prior=prior), progress)
+    with no_empty_folder(output):
+        return build_map(MapTask(requests, database, output_files(logs, output), prior), progress)
 
 
-def _from_reference(logs: list[Location], database: Path, json: bool) -> None:
+def _from_reference(logs: list[Location], database: Path, given: LogOptions) -> None:
     from mcap_landmarks.runs.reference_map import map_from_reference
 
     if len(logs) != 1:
         raise UsageError("--from-reference takes one log; name just that one")
-    landmark_map = map_from_reference(logs[0], database)
-    if json:
+    landmark_map = map_from_reference(logs[0], database, overwrite=given.overwrite)
+    if given.json:
         say_json(
             "map", {"database": str(database), "landmarks": len(landmark_map), "tentative": 0, "logs": [], "stages": {}}
         )
     else:
-        say(f"{database}: {len(landmark_map)} surveyed landmarks from {logs[0]}")
+        say(f"{database}: {counted(len(landmark_map), 'surveyed landmark')} from {logs[0]}")
 
 
 def _stages(run: "MapRun", log: "MappedLog") -> "list[StageRun]":
@@ -120,7 +124,7 @@ def _document(run: "MapRun", database: Path) -> dict[str, object]:
 
 def _print(run: "MapRun", database: Path) -> None:
     tentative = int(run.landmark_map.tentative.sum())
-    say(f"{database}: {len(run.landmark_map) - tentative} landmarks, {tentative} tentative")
+    say(f"{database}: {counted(len(run.landmark_map) - tentative, 'landmark')}, {tentative} tentative")
     rows = [
         [str(log.recording), str(source.bundles), str(source.used)]
         for log, source in zip(run.logs, run.sources, strict=True)

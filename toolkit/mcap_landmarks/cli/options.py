@@ -102,6 +102,12 @@ Fixed = Annotated[
     bool,
     typer.Option("--fixed", help="Leave out what may stand elsewhere another day, by its class: people, cars, bags."),
 ]
+Overwrite = Annotated[
+    bool,
+    typer.Option(
+        "--overwrite", help="Replace files that are no earlier result of the same verb and inputs; never an input."
+    ),
+]
 Force = Annotated[bool, typer.Option("--force", help="Run every stage anew, also where its results are there.")]
 ConfigFile = Annotated[
     Location | None, typer.Option("--config", parser=location, help="TOML file with one table per stage.")

@@ -34,20 +34,22 @@ def command(
         Show, typer.Option("--show", help="The map with its runs, positions beside the truth, or boxes of the errors.")
     ] = Show.MAP,
     title: Annotated[str, typer.Option("--title", help="A line above the plot.")] = "",
+    overwrite: options.Overwrite = False,
 ) -> None:
     """Plot INPUT... into one picture (.png, .svg, .pdf): landmarks by class, paths, positions and their errors."""
-    from mcap_landmarks.atomic import atomic_file, check_target
+    from mcap_landmarks.atomic import atomic_file
     from mcap_landmarks.report.drawing import gather
     from mcap_landmarks.report.error_plots import errors_figure, positions_figure
     from mcap_landmarks.report.plots import figure, form_of, save
+    from mcap_landmarks.runs.replacing import earlier_picture, output_to, picture_mark
 
     form = form_of(output)
-    check_target(output)
-    with progress("read", sum(map(size_of, inputs))) as advance:
-        drawing, losses = gather(inputs, aligned=align, progress=advance)
-    draw = {Show.MAP: figure, Show.POSITIONS: positions_figure, Show.ERRORS: errors_figure}[show]
-    with atomic_file(output) as stream:
-        save(partial(draw, drawing, title), stream, form)
+    with output_to(output, inputs, earlier_picture("plot", inputs), overwrite=overwrite):
+        with progress("read", sum(map(size_of, inputs))) as advance:
+            drawing, losses = gather(inputs, aligned=align, progress=advance)
+        draw = {Show.MAP: figure, Show.POSITIONS: positions_figure, Show.ERRORS: errors_figure}[show]
+        with atomic_file(output) as stream:
+            save(partial(draw, drawing, title), stream, form, picture_mark("plot", inputs))
     for loss in losses:
         warn(f"warning: {loss}")
     if losses:

@@ -1,7 +1,7 @@
 """What the verbs that run stages over logs share: the runs themselves, notes, documents, exit codes."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import typer
@@ -10,6 +10,7 @@ from mcap_landmarks.cli.console import PARTIAL, progress, say_json, warn
 from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
 from mcap_landmarks.cli.options import time_ns
 from mcap_landmarks.locations import Location
+from mcap_landmarks.wording import tallied
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.bundles import Span
@@ -46,7 +47,19 @@ class Given:
         own = [*self.scans.settings(), *self.settings]
         settings = gather(given.config_file, [*(given.settings or []), *own], given.method)
         span, thinning, use = self._span(), self.images.thinning(), tuple(self.use or ())
-        return [Request(log, settings, files, span, thinning, use, given.results_only, given.force) for log in logs]
+        first = Request(
+            logs[0],
+            settings,
+            files,
+            span,
+            thinning,
+            use,
+            results_only=given.results_only,
+            force=given.force,
+            overwrite=given.overwrite,
+            config_file=given.config_file,
+        )
+        return [replace(first, recording=log) for log in logs]
 
     def _span(self) -> "Span":
         from mcap_landmarks.inspection.topic_roles import Choice, parse_offsets, parse_remaps
@@ -65,14 +78,18 @@ def run_over(
     verb: str, names: Sequence[str], logs: Sequence[Location], output: Location, given: Given, *, lacking: bool = False
 ) -> "list[LogRun]":
     """Run stages over every log; `lacking` puts those before them that a log still lacks."""
-    from mcap_landmarks.runs.outputs import output_files
+    from mcap_landmarks.runs.outputs import no_empty_folder, output_files
     from mcap_landmarks.runs.pipeline import run_stages
+    from mcap_landmarks.runs.replacing import check_apart
 
     requests = given.requests(logs)
-    targets = output_files(logs, output)
-    return [
-        run_stages(request, targets[request.recording], names, verb, progress, lacking=lacking) for request in requests
-    ]
+    with no_empty_folder(output):
+        targets = output_files(logs, output)
+        check_apart(targets.values(), [place for request in requests for place in request.reads()])
+        return [
+            run_stages(request, targets[request.recording], names, verb, progress, lacking=lacking)
+            for request in requests
+        ]
 
 
 def finish(
@@ -107,7 +124,7 @@ def tell(path: Location, stages: "Sequence[StageRun]", notes: Sequence[str], los
     for note in notes:
         warn(f"note: {path}: {note}")
     for reason, count in dropped(stages).items():
-        warn(f"note: {path}: {count} {reason}")
+        warn(f"note: {path}: {tallied(count, reason)}")
     for loss in losses:
         warn(f"warning: {path}: {loss}")
 

@@ -19,7 +19,7 @@ from mcap_landmarks.evaluation import tum
 from mcap_landmarks.evaluation.collected import ONCE, Collected
 from mcap_landmarks.evaluation.metrics import NOWHERE, Reference, RunResult
 from mcap_landmarks.evaluation.trajectory import Trajectory
-from mcap_landmarks.locations import Location
+from mcap_landmarks.locations import Location, to_read
 from mcap_landmarks.maps.database import read_map
 from mcap_landmarks.maps.exchange import read_text
 from mcap_landmarks.maps.exchange_thesis import parse_results
@@ -29,6 +29,7 @@ from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.stage import Channel, Connection
+from mcap_landmarks.wording import counted
 
 _RESULTS = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, MAP, MAP_MARKERS, MAP_POSE)
 _TRUTH = (TRUTH_POSE, TRUTH_OBJECTS)
@@ -82,7 +83,7 @@ def _appendix_d(path: Location) -> tuple[RunResult, Reference]:
 def is_database(path: Location) -> bool:
     """Whether a file is, or by its name should be, a landmark database."""
     try:
-        with path.open("rb") as stream:
+        with to_read(path).open("rb") as stream:
             return path.suffix == ".db" or stream.read(15) == b"SQLite format 3"
     except OSError:
         return path.suffix == ".db"  # opening it says what is wrong
@@ -104,7 +105,7 @@ def _collect(path: Location, channels: tuple[Channel[Message], ...], progress: P
                 found.add(channel, _text(raw.connection.schema), *held.pop((channel, raw.connection.schema)))
         for (channel, schema), rest in held.items():
             found.add(channel, _text(schema), *rest)
-        broken = (f"{topic}: {count} messages could not be decoded" for topic, count in found.broken.items())
+        broken = (f"{topic}: {counted(count, 'message')} could not be decoded" for topic, count in found.broken.items())
         found.losses.extend([*broken, *recording.losses])
     return found
 

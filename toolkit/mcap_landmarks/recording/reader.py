@@ -12,7 +12,7 @@ from mcap import records
 from mcap.exceptions import McapError
 
 from mcap_landmarks.errors import RecordingError
-from mcap_landmarks.locations import Location
+from mcap_landmarks.locations import Location, to_read
 from mcap_landmarks.manifest import RUN, carried_fingerprint
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.blocks import DamagedBlockError, block_messages
@@ -20,6 +20,7 @@ from mcap_landmarks.recording.container import CHUNK, MAGIC, RECORD, Opcode, par
 from mcap_landmarks.recording.rebuild_index import index_by_scanning
 from mcap_landmarks.recording.summary_index import Block, Index, index_from_summary, read_record
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
+from mcap_landmarks.wording import counted
 
 
 @contextlib.contextmanager
@@ -35,7 +36,7 @@ def open_recording(path: Location, *, verify: bool = True) -> Iterator["Recordin
 
 def _open(path: Location) -> BinaryIO:
     try:
-        return path.open("rb")
+        return to_read(path).open("rb")
     except FileNotFoundError as error:
         raise RecordingError(f"{path}: there is no such file; check the path") from error
     except IsADirectoryError as error:
@@ -44,6 +45,8 @@ def _open(path: Location) -> BinaryIO:
         ) from error
     except PermissionError as error:
         raise RecordingError(f"{path} may not be read; change its permissions") from error
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read ({error.strerror}); check the path") from error
 
 
 def _index(path: Location, stream: BinaryIO) -> Index:
@@ -83,7 +86,7 @@ class Recording:
         )
         orphans = sum(count for key, count in index.counts.items() if key not in self._connections)
         if orphans:
-            self.losses.append(f"{orphans} messages belong to channels that are nowhere described; they are left out")
+            self.losses.append(f"{counted(orphans, 'message')} of channels that are nowhere described left out")
 
     def connections(self, topic: str) -> tuple[Connection, ...]:
         """The connections of a topic, most often one."""

@@ -20,6 +20,8 @@ from mcap_landmarks.report.drawing import Drawing, Run, breaks, follows, waypoin
 
 FORMATS = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None}}
 """Formats, and the metadata of each that would tell the clock or the program's version."""
+_MARKED = {"png": "Description", "svg": "Description", "pdf": "Subject"}
+"""Where each format's metadata has room for a text."""
 
 _PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A5195", "#4D4D4D")  # Okabe, Ito 2008
 _MARKERS = "osD^vPXp"
@@ -46,13 +48,14 @@ def form_of(path: Location) -> str:
     return form
 
 
-def save(draw: Callable[[], Figure], stream: BinaryIO, form: str) -> None:
-    """Draw a figure into a stream as `png`, `svg` or `pdf`. Same figure, same bytes."""
+def save(draw: Callable[[], Figure], stream: BinaryIO, form: str, mark: str = "") -> None:
+    """Draw a figure into a stream as `png`, `svg` or `pdf`, with a mark in its metadata. Same figure, same bytes."""
+    metadata = {**FORMATS[form], **({_MARKED[form]: mark} if mark else {})}
     with mpl.rc_context(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         mpl.rcdefaults()
         _set_style()
-        draw().savefig(stream, format=form, metadata=FORMATS[form], bbox_inches="tight", pad_inches=0.1)
+        draw().savefig(stream, format=form, metadata=metadata, bbox_inches="tight", pad_inches=0.1)
 
 
 def _set_style() -> None:

@@ -97,7 +97,7 @@ def _holds_several(path: Path) -> bool:
 def run_tasks(tasks: Sequence[Task], workers: int, progress: Callable[[int], None]) -> list[Ended]:
     """Run the tasks, so many at a time, and tell how each ended, in their order; `progress` gets 1 for each.
 
-    Numeric libraries use one thread per process. On Ctrl-C the running ones are interrupted and waited for.
+    Numeric libraries use one thread per process. On Ctrl-C or SIGTERM the running ones get the same and are waited for.
     """
     processes = _Processes()
     with ThreadPoolExecutor(workers) as pool:
@@ -106,9 +106,9 @@ def run_tasks(tasks: Sequence[Task], workers: int, progress: Callable[[int], Non
             for future in as_completed(futures):
                 future.result()
                 progress(1)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemExit) as stop:
             pool.shutdown(wait=False, cancel_futures=True)
-            processes.interrupt()
+            processes.interrupt(signal.SIGINT if isinstance(stop, KeyboardInterrupt) else signal.SIGTERM)
             raise
     return [future.result() for future in futures]
 
@@ -142,13 +142,13 @@ class _Processes:
             self._running.discard(process)
         return Ended(task, process.returncode, stdout, stderr)
 
-    def interrupt(self) -> None:
+    def interrupt(self, how: signal.Signals) -> None:
         """Let each process clean up and end; one that does not is killed."""
         with self._lock:
             self._stopped = True
             running = list(self._running)
         for process in running:
-            process.send_signal(signal.SIGINT)
+            process.send_signal(how)
         for process in running:
             try:
                 process.wait(_LAST_WORDS_S)

@@ -2,10 +2,11 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
-from mcap_landmarks.atomic import check_target
+from mcap_landmarks.atomic import held
 from mcap_landmarks.errors import MapError, RecordingError
 from mcap_landmarks.manifest import Manifest, Outcome
 from mcap_landmarks.mapping.built_map import BuiltMap
@@ -14,6 +15,7 @@ from mcap_landmarks.maps.database import read_map, write_map
 from mcap_landmarks.progress import Watch, unwatched
 from mcap_landmarks.runs.map_plan import LogPlan, MapPlan, MapTask, plan_map
 from mcap_landmarks.runs.map_results import (
+    VERB,
     MappedLog,
     MapRun,
     build_outcome,
@@ -22,7 +24,8 @@ from mcap_landmarks.runs.map_results import (
     write_log,
     write_part,
 )
-from mcap_landmarks.runs.pipeline import check_output, told
+from mcap_landmarks.runs.pipeline import told
+from mcap_landmarks.runs.replacing import check_apart, check_replaceable, earlier_map, earlier_recording
 from mcap_landmarks.runs.session import Session, StageRun, open_session, parts_folder
 from mcap_landmarks.runs.stage_input import StageInput
 from mcap_landmarks.runs.stage_runner import outcome_of
@@ -35,16 +38,32 @@ def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
     Raises:
         ToolkitError: a log or file cannot be used, or what was seen is not enough for a map.
     """
-    check_target(task.database)
-    for recording, output in task.outputs.items():
-        check_output(recording, output)
-    with parts_folder(task.database) as parts:
+    check_apart([task.database, *task.outputs.values()], task.reads())
+    with ExitStack() as stack:
+        parts = stack.enter_context(parts_folder(task.database))
+        for output in task.outputs.values():
+            stack.enter_context(held(output))
         plan = plan_map(task, parts)
+        _check_replaceable(plan)
         run = None if task.requests[0].force else earlier_run(plan, parts)
         if run is None:
             run = _build(plan, parts, watch)
         written = [write_log(plan, log, one, parts, watch) for log, one in zip(plan.logs, run.logs, strict=True)]
     return replace(run, logs=tuple(written))
+
+
+def _check_replaceable(plan: MapPlan) -> None:
+    """Refuse to replace what is no earlier result of these logs.
+
+    Raises:
+        UsageError: as it says.
+    """
+    task, overwrite = plan.task, plan.task.requests[0].overwrite
+    targets, fingerprints = [task.database, *task.outputs.values()], [log.fingerprint for log in plan.logs]
+    check_apart(targets, [file for log in plan.logs for step in log.steps for file in step.files.values()])
+    check_replaceable(task.database, earlier_map(VERB, fingerprints), overwrite=overwrite)
+    for output in task.outputs.values():
+        check_replaceable(output, earlier_recording(VERB, fingerprints), overwrite=overwrite)
 
 
 def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
@@ -62,7 +81,7 @@ def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
     build = StageRun(STAGE.name, "ran", reason, build_outcome(plan, termination))
     run = MapRun(landmark_map, build, tuple(logs), termination)
     fingerprints = tuple(log.fingerprint for log in logs)
-    manifest = Manifest("map", inputs=fingerprints, options=run.options(), stages=(plan.record,))
+    manifest = Manifest(VERB, inputs=fingerprints, options=run.options(), stages=(plan.record,))
     write_map(plan.task.database, landmark_map, manifest.entries())
     return run
 

@@ -25,6 +25,7 @@ from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.spatial_objects import SpatialObjects
 from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.moments import moment
 from mcap_landmarks.recording.odometry_track import OdometryTrack
 from mcap_landmarks.recording.time_association import Association, associate
 from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage, Readable
@@ -71,7 +72,7 @@ class Reading:
         """Count a message that cannot be read; the first of a topic is told in full."""
         self.unreadable[topic] += 1
         if self.unreadable[topic] == 1:
-            self.losses.append(f"{topic} at {log_time_ns}: {reason}")
+            self.losses.append(f"{topic} at {moment(log_time_ns)}: {reason}")
 
     def close(self, losses: Iterable[str]) -> None:
         """Sum up when everything was read; `losses` are the recording's own."""

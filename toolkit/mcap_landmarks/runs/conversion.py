@@ -13,6 +13,7 @@ from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog
 from mcap_landmarks.manifest import CARRIED, RUN, Manifest, entry_text, is_generated
 from mcap_landmarks.messages.qos import KEY
+from mcap_landmarks.moments import moment
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.writer import create_recording
@@ -158,9 +159,10 @@ class Job:
         if done.lost:
             return f"none of {done.lost} declared messages can be read; copy it again"
         if declared:
-            start = min((log.start_ns for log in self._logs if log.start_ns is not None), default=None)
-            end = max((log.end_ns for log in self._logs if log.end_ns is not None), default=None)
-            return f"no message lies in the time range; the log goes from {start} to {end}"
+            starts = [log.start_ns for log in self._logs if log.start_ns is not None]
+            ends = [log.end_ns for log in self._logs if log.end_ns is not None]
+            lasts = f"from {moment(min(starts))} to {moment(max(ends))}" if starts and ends else "no time at all"
+            return f"no message lies in the time range; the log lasts {lasts}"
         if done.dropped:
             return "; ".join(f"{reason} ({count})" for reason, count in done.dropped.items())
         return "there are no messages in it; choose another log, or other --topics"

@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,7 +15,8 @@ from mcap_landmarks.locations import Location, to_write
 from mcap_landmarks.manifest import file_hash
 from mcap_landmarks.progress import Watch
 from mcap_landmarks.runs.conversion import Converted, Job, Selection
-from mcap_landmarks.runs.outputs import make_folder, output_files
+from mcap_landmarks.runs.outputs import make_folder, no_empty_folder, output_files
+from mcap_landmarks.runs.replacing import check_apart, earlier_recording, output_to
 
 
 @dataclass(slots=True)
@@ -27,11 +28,20 @@ class Conversion:
 
 
 def convert(
-    inputs: Sequence[Location], output: Location, selection: Selection, settings: Settings, watch: Watch
+    inputs: Sequence[Location],
+    output: Location,
+    selection: Selection,
+    settings: Settings,
+    watch: Watch,
+    *,
+    beside: Sequence[Location] = (),
+    overwrite: bool = False,
 ) -> Conversion:
     """Convert the logs of some inputs: into the file `output`, merged by time, or one by one into that folder.
 
-    A folder is meant where an input has several logs, or where several inputs meet an `output` without `.mcap`.
+    A folder is meant where an input has several logs, or where several inputs meet an `output` without `.mcap`. What is
+    there is replaced if it was converted from the same inputs, or if it is to be overwritten; what is read `beside` the
+    inputs is not.
 
     Raises:
         ToolkitError: nothing could be converted; nothing is left behind.
@@ -43,32 +53,24 @@ def convert(
             raise UsageError(f"{place} is given {count} times; name each input once")
     with contextlib.ExitStack() as stack:
         logs = [log for place in inputs for log in stack.enter_context(open_logs(place, settings))]
-        stack.enter_context(_no_empty_folder(there))
+        stack.enter_context(no_empty_folder(there))
         plan = _plan(logs, there)
+        check_apart(plan, [*inputs, *beside])
         hashes = {path: _content_hash(path, watch) for path in dict.fromkeys(log.path for log in logs)}
         for target, group in plan.items():
+            earlier = earlier_recording("convert", [hashes[log.path] for log in group])
             try:
                 job = Job(target, group, selection, patterns)
-                with watch(f"convert to {target.name}", sum(log.size_bytes for log in group)) as advance:
+                with (
+                    output_to(target, (), earlier, overwrite=overwrite),
+                    watch(f"convert to {target.name}", sum(log.size_bytes for log in group)) as advance,
+                ):
                     conversion.outputs.append(job.run(hashes, advance))
             except ToolkitError as error:
                 conversion.failures.append(error)
         if not conversion.outputs:
             raise conversion.failures[0]
     return conversion
-
-
-@contextlib.contextmanager
-def _no_empty_folder(output: Path) -> Iterator[None]:
-    """Take a folder away again that was made in the block and holds nothing at its end."""
-    made = not output.exists()
-    try:
-        yield
-    except ToolkitError:
-        if made and output.is_dir():
-            with contextlib.suppress(OSError):
-                output.rmdir()
-        raise
 
 
 def _plan(logs: Sequence[OpenLog], output: Path) -> dict[Path, list[OpenLog]]:
@@ -82,9 +84,6 @@ def _plan(logs: Sequence[OpenLog], output: Path) -> dict[Path, list[OpenLog]]:
         names = [Path(f"{log.name}.mcap") for log in logs]
         targets = _in_folder(names, output) if several else list(output_files(names, output).values())
         plan = {target: [log] for target, log in zip(targets, logs, strict=True)}
-    for target in plan:
-        if target.exists() and any(target.resolve().is_relative_to(log.path.resolve()) for log in logs):
-            raise UsageError(f"{target} is part of the input; write to another file")
     return plan
 
 

@@ -40,6 +40,10 @@ class MapTask:
         """The files that the map is made with."""
         return {"prior": self.prior} if self.prior is not None else {}
 
+    def reads(self) -> list[Location]:
+        """The files that are read, as far as they were named."""
+        return [*self.files.values(), *(place for request in self.requests for place in request.reads())]
+
 
 @dataclass(frozen=True, slots=True)
 class LogPlan:

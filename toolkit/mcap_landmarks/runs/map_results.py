@@ -23,6 +23,8 @@ from mcap_landmarks.runs.pipeline import told
 from mcap_landmarks.runs.session import StageRun, open_session, part_file
 from mcap_landmarks.stage import Stamped
 
+VERB = "map"
+"""What the manifests of a map and of its logs call what made them."""
 _LOGS = "logs"
 """The manifest's option with what came of each log: of the stages before, then of the map."""
 _SOLVER = "solver"
@@ -134,6 +136,6 @@ def write_log(plan: MapPlan, log: LogPlan, mapped: MappedLog, parts: Path, watch
             if session.find(step.record) is None:
                 session.work(step, watch)
         session.find(plan.share(log))
-        notes, losses = write_output(session, output, "map", [other.fingerprint for other in plan.logs], watch)
+        notes, losses = write_output(session, output, VERB, [other.fingerprint for other in plan.logs], watch)
     all_notes, all_losses = told([StageRun(plan.record.stage, "", "", outcome)], notes, losses)
     return replace(mapped, outcome=replace(outcome, notes=all_notes, losses=all_losses))

@@ -1,6 +1,7 @@
 """Names of output files: the one that the user gave, or one per input in a folder."""
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from mcap_landmarks.atomic import check_target
@@ -46,3 +47,17 @@ def make_folder(place: Location) -> Path:
         reason = error.strerror or str(error)
         raise RecordingError(f"{folder}: cannot be made ({reason}); choose another place with -o") from error
     return folder
+
+
+@contextlib.contextmanager
+def no_empty_folder(place: Location) -> Iterator[None]:
+    """Take a folder away again that was made in the block, if the block fails and it holds nothing."""
+    folder = to_write(place)
+    is_new = not folder.exists()
+    try:
+        yield
+    except BaseException:
+        if is_new and folder.is_dir():
+            with contextlib.suppress(OSError):
+                folder.rmdir()
+        raise

@@ -4,15 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mcap_landmarks.atomic import check_target
-from mcap_landmarks.errors import UsageError
-from mcap_landmarks.locations import Location, to_read
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import Outcome
 from mcap_landmarks.progress import Watch, unwatched
 from mcap_landmarks.runs.clock_refusal import clock_notes
 from mcap_landmarks.runs.needed_stages import in_order, missing_stages
 from mcap_landmarks.runs.output_writer import write_output
 from mcap_landmarks.runs.plan import Request, check_cameras, plan
+from mcap_landmarks.runs.replacing import check_apart, check_replaceable, earlier_recording
 from mcap_landmarks.runs.session import StageRun, open_session, parts_folder
 from mcap_landmarks.stages import find_stage
 
@@ -50,17 +49,20 @@ def run_stages(
         ToolkitError: input or output cannot be used; of the output nothing is left behind.
     """
     names = in_order(names)
-    check_output(request.recording, output)
+    check_apart([output], request.reads())
     with parts_folder(output) as parts, open_session(request, parts, output) as session:
+        inputs = [session.log.recording.fingerprint()]
+        check_replaceable(output, earlier_recording(verb, inputs), overwrite=request.overwrite)
         if lacking:
             use = (*session.request.use, *names)
             before = [other for name in names for other in missing_stages(find_stage(name), session.log, use)]
             names = in_order([*before, *names])
         check_cameras(session.request, session.log, names)
         steps = plan(session.request, session.log, names)
+        check_apart([output], [file for step in steps for file in step.files.values()])
         clocks = clock_notes(session, steps)
         runs = [session.work(step, watch) for step in steps]
-        notes, losses = write_output(session, output, verb, [session.log.recording.fingerprint()], watch)
+        notes, losses = write_output(session, output, verb, inputs, watch)
         return LogRun(request.recording, output, tuple(runs), *told(runs, [*notes, *clocks], losses))
 
 
@@ -71,14 +73,3 @@ def told(
     noted = [note for run in runs for note in run.outcome.notes]
     lost = [loss for run in runs for loss in run.outcome.losses]
     return tuple(dict.fromkeys([*noted, *notes])), tuple(dict.fromkeys([*lost, *losses]))
-
-
-def check_output(recording: Location, output: Path) -> None:
-    """Refuse an output that cannot be written or is the input.
-
-    Raises:
-        UsageError: as it says.
-    """
-    check_target(output)
-    if output.resolve() == to_read(recording).resolve():
-        raise UsageError(f"{output} is the input itself; write to another file")

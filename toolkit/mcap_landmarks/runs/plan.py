@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 from mcap_landmarks.channels import CAMERA_INFO, ODOMETRY, RESULTS
-from mcap_landmarks.config import Settings, effective, load, load_files
+from mcap_landmarks.config import Settings, effective, load, load_files, named_files
 from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.inspection.camera_checks import refuse_cameras
@@ -28,7 +28,8 @@ class Request:
     """What to do with one log: settings of all stages, files by resource name, how much of the log, and how.
 
     `use` names the stages that are wanted where several write the same channel. `force` runs every stage anew, whatever
-    results there are.
+    results there are. `overwrite` lets the output replace what is no earlier result. `config_file` is where settings
+    were read, and is no more to be replaced than the other files.
     """
 
     recording: Location
@@ -39,6 +40,13 @@ class Request:
     use: tuple[str, ...] = ()
     results_only: bool = False
     force: bool = False
+    overwrite: bool = False
+    config_file: Location | None = None
+
+    def reads(self) -> list[Location]:
+        """The files that are read, as far as they were named."""
+        files = [*self.files.values(), *named_files(self.settings).values()]
+        return [self.recording, *(file for file in [*files, self.config_file] if file is not None)]
 
     def options(self) -> dict[str, object]:
         """For the manifest: what was asked for."""

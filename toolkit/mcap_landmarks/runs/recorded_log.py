@@ -47,6 +47,6 @@ def _check_span(recording: Recording, span: Span) -> None:
         return
     if (span.start_ns or 0) > last or (span.end_ns is not None and span.end_ns <= first):
         raise UsageError(
-            f"{recording.path}: no message lies between --start and --end; the log lasts from {moment(first)} to "
-            f"{moment(last)}"
+            f"{recording.path}: no message lies between --start and --end; "
+            f"the log lasts from {moment(first)} to {moment(last)}"
         )

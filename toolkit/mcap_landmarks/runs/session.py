@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from mcap_landmarks.atomic import held
 from mcap_landmarks.channels import DRAWN, ODOMETRY, SHARED
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.inspection.examination import Asked, Examiner
@@ -37,16 +38,20 @@ class StageRun:
 def parts_folder(output: Path) -> Iterator[Path]:
     """Where finished stages lie until the output is whole: `.OUTPUT.parts`, which goes when the block ends well.
 
-    When it does not, what is finished stays for the next run.
+    When it does not, what is finished stays for the next run. No other process can work on the output meanwhile.
+
+    Raises:
+        UsageError, RecordingError: the output cannot be written, or another process writes it.
     """
-    folder = output.with_name(f".{output.name}.parts")
-    is_whole = False
-    try:
-        yield folder
-        is_whole = True
-    finally:
-        if folder.is_dir() and (is_whole or not any(folder.iterdir())):
-            shutil.rmtree(folder, ignore_errors=True)
+    with held(output) as path:
+        folder = path.with_name(f".{path.name}.parts")
+        is_whole = False
+        try:
+            yield folder
+            is_whole = True
+        finally:
+            if folder.is_dir() and (is_whole or not any(folder.iterdir())):
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 def part_file(folder: Path, record: StageRecord) -> Path:

@@ -16,6 +16,7 @@ from mcap_landmarks.messages.qos import KEY
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.sources._ros2_types import check_fits, definition_in, known_distribution
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
+from mcap_landmarks.wording import counted
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _REPORT_BYTES = 1 << 20
@@ -81,7 +82,7 @@ class Db3Log:
         ]
         orphans = sum(count for key, count in counts.items() if key not in self._topics)
         if orphans:
-            self._lose(f"{orphans} messages belong to topics that are nowhere described")
+            self._lose(f"{counted(orphans, 'message')} of topics that are nowhere described left out")
 
     def _count(self, database: sqlite3.Connection) -> Counter[int]:
         counts: Counter[int] = Counter()

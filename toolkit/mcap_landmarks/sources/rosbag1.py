@@ -16,6 +16,7 @@ from mcap_landmarks.sources._merge import merge
 from mcap_landmarks.sources._ros1_types import Convert, converted
 from mcap_landmarks.sources._shape import NoConfig, Source, SourceLog
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
+from mcap_landmarks.wording import counted
 
 
 def recognises(path: Path) -> bool:
@@ -121,12 +122,12 @@ class BagLog:
         where = f"the chunk at byte {chunk.offset}"
         if missing > 0:
             why = f" ({problem})" if problem else ""
-            self._lose(f"{where}{why} lacks {missing} of {sum(chunk.counts.values())} messages")
+            self._lose(f"{where}{why} lacks {missing} of {counted(sum(chunk.counts.values()), 'message')}")
         elif problem:
-            self._lose(f"{where} is damaged ({problem}); the {len(found)} messages before that were taken")
+            self._lose(f"{where} is damaged ({problem}); {counted(len(found), 'message')} before that taken")
         orphans = sum(message.connection_id not in self._connections for message in found)
         if orphans:
-            self._lose(f"{orphans} messages of {where} belong to no connection")
+            self._lose(f"{counted(orphans, 'message')} of {where} without a connection left out")
         return found
 
     def _conversion(self, connection: Connection) -> Convert:

@@ -1,0 +1,173 @@
+"""What an output may replace: never what is read, and what is there only if it is an earlier result of the same."""
+
+import contextlib
+import hashlib
+import json
+import os
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+
+from mcap_landmarks.atomic import check_target, held
+from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.locations import Location, to_read, to_write
+from mcap_landmarks.manifest import CONTENT, RUN, entry_text, file_hash
+from mcap_landmarks.maps.database import read_manifest
+from mcap_landmarks.recording.reader import open_recording
+
+IsEarlier = Callable[[Path], bool]
+"""Says of a file that is there whether it is an earlier result of what is made now."""
+
+
+@contextlib.contextmanager
+def output_to(
+    target: Location, read: Iterable[Location], is_earlier: IsEarlier, *, overwrite: bool = False
+) -> Iterator[Path]:
+    """The path of an output, which no other process writes while the block runs and which the block may replace.
+
+    Raises:
+        UsageError: it cannot be written, is one of the files that are `read`, or has to stay (see `check_replaceable`).
+        RecordingError: another process writes it, or the folder may not be written.
+    """
+    path = check_target(target)
+    check_apart([path], read)
+    with held(path):
+        check_replaceable(path, is_earlier, overwrite=overwrite)
+        yield path
+
+
+@contextlib.contextmanager
+def new_files(
+    targets: Iterable[Location | None], read: Iterable[Location | None], *, overwrite: bool = False
+) -> Iterator[None]:
+    """Hold outputs that do not tell what they were made of, as far as they are named: none may exist.
+
+    Raises:
+        UsageError, RecordingError: see `output_to`.
+    """
+    paths = [check_target(target) for target in targets if target is not None]
+    check_apart(paths, [place for place in read if place is not None])
+    with contextlib.ExitStack() as stack:
+        for path in paths:
+            stack.enter_context(output_to(path, (), lambda _path: False, overwrite=overwrite))
+        yield
+
+
+def check_apart(targets: Collection[Location], read: Iterable[Location]) -> None:
+    """Refuse outputs that are one file, or that are read: also by another name, through links, or in a folder.
+
+    Raises:
+        UsageError: as it says, or a file is not on this machine.
+    """
+    paths, sources = [to_write(target) for target in targets], [to_read(place) for place in read]
+    known: dict[str, Path] = {}
+    for path in paths:
+        other = known.setdefault(os.path.realpath(path), path)
+        if other is not path:
+            raise UsageError(f"{path}: two outputs would be this file; give each a name of its own")
+    for path in filter(Path.exists, paths):
+        for source in sources:
+            if _is_same(path, source):
+                named = "the input itself" if path == source else f"the input {source} itself"
+                raise UsageError(f"{path} is {named}; write to another file")
+            if source.is_dir() and _is_in(path, source):
+                raise UsageError(f"{path} is part of the input {source}; write to another file")
+
+
+def check_replaceable(path: Path, is_earlier: IsEarlier, *, overwrite: bool) -> None:
+    """Refuse to replace what is there, unless it is an earlier result or the user says so.
+
+    Raises:
+        UsageError: as it says.
+    """
+    if path.exists() and not overwrite and not is_earlier(path):
+        raise UsageError(
+            f"{path} exists and is no earlier result of the same verb and inputs; write to another file, or replace it "
+            "with --overwrite"
+        )
+
+
+def earlier_recording(verb: str, inputs: Sequence[str]) -> IsEarlier:
+    """Recordings that a verb made of recordings with these fingerprints, with whatever settings."""
+    return _recording_with(_made_by(verb, inputs))
+
+
+def generated_recording(entries: Mapping[str, str]) -> IsEarlier:
+    """Recordings of the same scenario and seed as the one with a manifest of these entries."""
+    return _recording_with({name: entries.get(name) for name in ("verb", "config", "seed")})
+
+
+def earlier_map(verb: str, inputs: Sequence[str]) -> IsEarlier:
+    """Landmark databases that a verb made of recordings with these fingerprints, with whatever settings."""
+    made = _made_by(verb, inputs)
+    return lambda path: _agree(read_manifest(path), made)
+
+
+def picture_mark(verb: str, inputs: Iterable[Location]) -> str:
+    """What a picture carries to be known again: the verb and a hash over what it shows.
+
+    Raises:
+        ToolkitError: an input cannot be read.
+    """
+    digest = hashlib.sha256("".join(map(_identity, inputs)).encode())
+    return f"mcap-landmarks {verb} of {digest.hexdigest()}"
+
+
+def earlier_picture(verb: str, inputs: Sequence[Location]) -> IsEarlier:
+    """Pictures that carry `picture_mark`."""
+    return lambda path: _holds(path, picture_mark(verb, inputs))
+
+
+def carries(text: str) -> IsEarlier:
+    """Files with a text among their bytes."""
+    return lambda path: _holds(path, text)
+
+
+def _holds(path: Path, text: str) -> bool:
+    return text.encode() in path.read_bytes()
+
+
+def _made_by(verb: str, inputs: Sequence[str]) -> dict[str, str | None]:
+    return {"verb": entry_text(verb), "inputs": entry_text(list(inputs))}
+
+
+def _recording_with(made: Mapping[str, str | None]) -> IsEarlier:
+    def is_earlier(path: Path) -> bool:
+        try:
+            with open_recording(path) as recording:
+                entries = recording.metadata.get(RUN, {})
+                return _agree(entries, made) and (CONTENT not in entries or recording.is_ours)
+        except RecordingError:
+            return False
+
+    return is_earlier
+
+
+def _agree(entries: Mapping[str, str], made: Mapping[str, str | None]) -> bool:
+    return all(_in_any_order(entries.get(name)) == _in_any_order(value) for name, value in made.items())
+
+
+def _in_any_order(text: str | None) -> object:
+    """The value of an entry; of logs that were named in another order the same is made."""
+    value = json.loads(text) if text is not None else None
+    return sorted(value) if isinstance(value, list) else value
+
+
+def _identity(place: Location) -> str:
+    """The fingerprint of a recording, so that its results do not change it; a hash of any other file."""
+    try:
+        with open_recording(place) as recording:
+            return recording.fingerprint()
+    except RecordingError:
+        return file_hash(place)
+
+
+def _is_same(path: Path, source: Path) -> bool:
+    try:
+        return path.samefile(source)
+    except OSError:  # there is no such input, which is told where it is opened
+        return False
+
+
+def _is_in(path: Path, folder: Path) -> bool:
+    inside = path.resolve().is_relative_to(folder.resolve())
+    return inside or any(_is_same(path, file) for file in folder.rglob("*") if file.is_file())
