@@ -46,6 +46,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("convert {0}/a.mcap -o {0}/b.mcap", "with --overwrite"),
         ("landmarks export {0}/a.db {0}/a.db --overwrite", "is the input itself"),
         ("landmarks import {0}/a.db {0}/a.db --overwrite", "is the input itself"),
+        ("export {0}/a.mcap --format tum -o {0}/hard.mcap --overwrite", "a.mcap itself; write to another file"),
+        ("export {0}/a.mcap --format tum -o {0}/config.toml", "with --overwrite"),
         ("plot {0}/a.mcap -o {0}/a.mcap", "the name does not tell the format"),
         ("localize {0}/a.mcap --map {0}/a.db -o /dev/full", "is not a regular file"),
     ],

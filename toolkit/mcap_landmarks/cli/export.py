@@ -7,6 +7,7 @@ import typer
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, warn
 from mcap_landmarks.locations import Location, location, size_of
+from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
     from mcap_landmarks.evaluation.export import TrajectoryFormat
@@ -27,24 +28,26 @@ def command(
     child: Annotated[
         str | None, typer.Option("--child", metavar="FRAME", help="Of transforms, those to this frame.")
     ] = None,
+    overwrite: options.Overwrite = False,
 ) -> None:
     """Write the poses of a topic of RESULT in the plane: position, heading, and covariance where the format has it."""
-    from mcap_landmarks.atomic import atomic_file, check_target
+    from mcap_landmarks.atomic import atomic_file
     from mcap_landmarks.evaluation.export import render
     from mcap_landmarks.evaluation.pose_topics import read_poses
+    from mcap_landmarks.runs.replacing import new_files
 
     chosen = _format(form)
-    check_target(output)
-    with progress(f"read {result.name}", size_of(result) or None) as advance:
-        track = read_poses(result, topic, child, advance)
-    text, notes = render(track, chosen)
-    with atomic_file(output) as stream:
-        stream.write(text.encode())
+    with new_files([output], [result], overwrite=overwrite):
+        with progress(f"read {result.name}", size_of(result) or None) as advance:
+            track = read_poses(result, topic, child, advance)
+        text, notes = render(track, chosen)
+        with atomic_file(output) as stream:
+            stream.write(text.encode())
     if topic is None and track.others:
         warn(f"note: {result}: {track.topic} is taken; --topic chooses another: {', '.join(track.others)}")
     for note in (*track.notes, *notes):
         warn(f"note: {result}: {note}")
-    say(f"{output}: {len(track.trajectory)} poses of {track.topic} in frame {track.frame or '(none named)'}")
+    say(f"{output}: {counted(len(track.trajectory), 'pose')} of {track.topic} in frame {track.frame or '(none named)'}")
     for loss in track.losses:
         warn(f"warning: {result}: {loss}")
     if track.losses:
