@@ -19,8 +19,8 @@ def case_input(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
     script = cases_folder() / "make_cases.py"
     if not script.is_file():
         pytest.skip("no cases at ../shared/cases")
-    listed = (getattr(getattr(item, "module", None), "CASES", ()) for item in request.session.items)
-    names = sorted({name for cases in listed for name in cases})
+    modules = {item.module for item in request.session.items if isinstance(item, pytest.Function)}
+    names = sorted({name for one in modules if one.__name__.startswith(__package__) for name in one.CASES})
     folder = tmp_path_factory.mktemp("cases")
     subprocess.run([sys.executable, script, RECORDINGS, folder, "--only", ",".join(names)], check=True)
     return lambda name: next(path.parent for path in folder.glob(f"{name}*"))

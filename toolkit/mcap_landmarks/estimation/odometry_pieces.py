@@ -54,13 +54,37 @@ class Pieces:
     places: tuple[tuple[float, float], ...] = ()
 
 
-def find_pieces(times_s: Array, poses: Array) -> Pieces:
+def find_pieces(times_s: Array, poses: Array, segment: Ints | None = None) -> Pieces:
     """What holds together of poses (N, 3) at rising times (N,): threads of motion that one robot can have made.
 
     Runs of poses without a leap are put together greedily, each with the thread whose last pose and velocity foretell
     it. Threads side by side are several robots; one after the other they are pieces, and where hardly any time lies
-    between them one piece, over which the robot is taken to have kept its velocity.
+    between them one piece, over which the robot is taken to have kept its velocity. `segment` (N,) rises: nothing joins
+    two of them.
     """
+    if segment is None or not len(segment) or segment[0] == segment[-1]:
+        return _pieces_of(times_s, poses)
+    cuts = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(poses)]
+    found = Pieces(np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 2)))
+    for first, end in pairwise(cuts):
+        found = _then(found, _pieces_of(times_s[first:end], poses[first:end]))
+    return found
+
+
+def _then(found: Pieces, more: Pieces) -> Pieces:
+    """Pieces, and those that follow them."""
+    count = int(found.piece.max(initial=NO_PIECE)) + 1
+    return Pieces(
+        np.concatenate([found.piece, np.where(more.piece == NO_PIECE, NO_PIECE, more.piece + count)]),
+        np.concatenate([found.poses, more.poses]),
+        np.concatenate([found.slack, more.slack]),
+        found.bridged + more.bridged,
+        found.dropped + more.dropped,
+        found.places or more.places,
+    )
+
+
+def _pieces_of(times_s: Array, poses: Array) -> Pieces:
     slack = np.zeros((len(poses), 2))
     steep = leaps(times_s, poses)
     if not steep.any():

@@ -25,6 +25,7 @@ from mcap_landmarks.messages.poses import PoseStamped, PoseWithCovarianceStamped
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.typestore import definition_in
 from mcap_landmarks.moments import moment
+from mcap_landmarks.recording.clocks import Clock
 from mcap_landmarks.stage import Channel
 
 Flags = NDArray[np.bool_]
@@ -36,7 +37,10 @@ ONCE = (MAP, MAP_MARKERS, TRUTH_OBJECTS)
 
 @dataclass(slots=True)
 class Collected:
-    """What is found in the recording `name`: poses and covariances in parts of N messages, matches, scenes, losses."""
+    """What is found in the recording `name`: poses and covariances in parts of N messages, matches, scenes, losses.
+
+    `clock` tells where the log's clock was set back.
+    """
 
     name: str
     poses: dict[str, list[tuple[Indices, Array]]] = field(default_factory=dict)
@@ -48,6 +52,7 @@ class Collected:
     once: dict[str, SceneObjects] = field(default_factory=dict)
     broken: Counter[str] = field(default_factory=Counter)
     losses: list[str] = field(default_factory=list)
+    clock: Clock = field(default_factory=Clock)
 
     def add(self, channel: Channel[Message], schema: str, logged_ns: Sequence[int], messages: Sequence[bytes]) -> None:
         """Take messages of a channel, in the order of their log times; those that cannot be decoded are counted.
@@ -73,6 +78,9 @@ class Collected:
             return
         stamps = table.columns["header.stamp"].values[:, 0]
         times = np.where(stamps == 0, np.array(logged_ns, dtype=np.int64), stamps)
+        if len(self.clock.shifts_ns) > 1:  # each moment of the log has a time of its own
+            pairs = zip(logged_ns, times.tolist(), strict=True)
+            times = times + np.array([self.clock.shift_ns(*pair) for pair in pairs], dtype=np.int64)
         if channel.message is PoseStamped:
             self._poses(channel.topic, times, table)
         elif channel.message is PoseWithCovarianceStamped:

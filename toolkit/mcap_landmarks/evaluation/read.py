@@ -25,8 +25,10 @@ from mcap_landmarks.maps.exchange import read_text
 from mcap_landmarks.maps.exchange_thesis import parse_results
 from mcap_landmarks.maps.map_message import scene_from_map
 from mcap_landmarks.messages.codec import Message
+from mcap_landmarks.messages.header import SHORTEST, stamp_in
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.progress import Progress
+from mcap_landmarks.recording.clocks import Clock, clock_of, shifts_of
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.stage import Channel, Connection
 from mcap_landmarks.wording import counted
@@ -90,8 +92,8 @@ def is_database(path: Location) -> bool:
 
 
 def _collect(path: Location, channels: tuple[Channel[Message], ...], progress: Progress | None) -> Collected:
-    found = Collected(str(path))
     with open_recording(path) as recording:
+        found = Collected(str(path), clock=_clock(recording))
         connections = _connections(recording, channels)
         held: dict[tuple[Channel[Message], bytes], tuple[list[int], list[bytes]]] = {}
         for raw in recording.messages(connections, progress=progress):
@@ -108,6 +110,18 @@ def _collect(path: Location, channels: tuple[Channel[Message], ...], progress: P
         broken = (f"{topic}: {counted(count, 'message')} could not be decoded" for topic, count in found.broken.items())
         found.losses.extend([*broken, *recording.losses])
     return found
+
+
+def _clock(recording: Recording) -> Clock:
+    """The clock that stamped the log, by whichever of its channels says most often when it was."""
+    for channel in (TRUTH_POSE, MATCH, POSE, MAP_POSE):
+        connections = recording.connections(channel.topic)
+        raws = recording.messages(connections) if connections else ()
+        pairs = [(raw.log_time_ns, stamp_in(raw.data)) for raw in raws if len(raw.data) >= SHORTEST]
+        if pairs:
+            log_ns, stamp_ns = np.array(pairs, dtype=np.int64).T
+            return clock_of(log_ns, stamp_ns, *shifts_of(log_ns, stamp_ns))
+    return Clock()
 
 
 def _text(schema: bytes) -> str:

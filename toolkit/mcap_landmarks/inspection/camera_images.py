@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 
 from mcap_landmarks.channels import CAMERA_IMAGE, RESULTS
@@ -25,11 +25,15 @@ _FIRST = 3
 
 @dataclass(frozen=True, slots=True)
 class CameraImages:
-    """The images of a CameraInfo: their topic, their size if that is known, and whether they are rectified."""
+    """The images of a CameraInfo: their topic, their size if that is known, and whether they are rectified.
+
+    The size is that of the first ones, beside a CameraInfo of `info_px`: one of another size is of other images.
+    """
 
     topic: str
     size_px: Size | None
     rectified: bool
+    info_px: Size | None = field(default=None, compare=False)
 
     def read(self, info: CameraInfo) -> CameraInfo:
         """A CameraInfo as that of these images.
@@ -37,7 +41,8 @@ class CameraImages:
         Raises:
             RecordingError: see `in_image`.
         """
-        return replace(in_image(info, self.size_px), of_rectified=self.rectified)
+        is_known = self.info_px in (None, (info.width_px, info.height_px))
+        return replace(in_image(info, self.size_px if is_known else None), of_rectified=self.rectified)
 
     def notes(self, topic: str, info: CameraInfo) -> list[str]:
         """What is to be said of how a CameraInfo on a topic is read; nothing where that is as usual."""
@@ -73,7 +78,20 @@ def images_of(recording: Readable, choice: Choice, infos: Sequence[Connection]) 
     alone = {
         info: found[0] for info, found in beside.items() if len({(one.size_px, one.rectified) for one in found}) == 1
     }
-    return {entry: alone[_named(entry, choice)] for entry in infos if _named(entry, choice) in alone}
+    return {
+        entry: replace(alone[_named(entry, choice)], info_px=_info_size(recording, entry))
+        for entry in infos
+        if _named(entry, choice) in alone
+    }
+
+
+def _info_size(recording: Readable, connection: Connection) -> Size | None:
+    """The size that the first CameraInfo of a connection says."""
+    try:
+        info = decode(CameraInfo, next(iter(recording.messages([connection]))).data)
+    except (MessageError, StopIteration):
+        return None
+    return info.width_px, info.height_px
 
 
 def first_size(recording: Readable, connection: Connection) -> Size | None:

@@ -15,6 +15,7 @@ from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.inspection.odometry_checks import check_frames, check_odometry, check_stray_stamps
 from mcap_landmarks.inspection.scan_checks import check_scans
 from mcap_landmarks.inspection.survey import Returns, Sensor, Survey, connected
+from mcap_landmarks.moments import moment
 from mcap_landmarks.recording.clocks import set_back, strays
 from mcap_landmarks.recording.time_association import BESIDE_NS, WINDOW_NS
 
@@ -95,7 +96,7 @@ def _gaps(found: Survey) -> Iterator[Finding]:
         worst = long[np.argmax(steps[long])]
         text = (
             f"{len(long)} gap{'s' if len(long) > 1 else ''}, the longest of {steps[worst] * 1e-9:.1f} s after "
-            f"{sensor.log_ns[int(worst)]}"
+            f"{moment(sensor.log_ns[int(worst)])}"
         )
         if sensor.role == "odometry" and steps[worst] > WINDOW_NS:
             remedy = (

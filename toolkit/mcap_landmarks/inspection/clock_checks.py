@@ -17,6 +17,7 @@ from mcap_landmarks.inspection.turn_samples import (
     read_turns,
     stretches,
 )
+from mcap_landmarks.moments import moment
 from mcap_landmarks.stage import Connection
 
 LEAST_BEARING_RAD = 0.01
@@ -154,7 +155,7 @@ def clock_findings(compared: Sequence[Comparison], silenced: Mapping[str, int] |
 def _standing(one: Comparison) -> Finding:
     (start_ns, end_ns), more = one.still_ns[0], len(one.still_ns) - 1
     others = f" and {more} times more" if more else ""
-    text = f"it stands still from {start_ns} to {end_ns}{others} while {one.sensor} turns"
+    text = f"it stands still from {moment(start_ns)} to {moment(end_ns)}{others} while {one.sensor} turns"
     remedy = "record odometry that follows the robot, or cut the log with --end before or --start after"
     return Finding("problem", "clock", one.odometry, text, f"{remedy}; {_SILENCE}")
 

@@ -6,7 +6,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from mcap_landmarks.channels import DETECTIONS, ODOMETRY, SCAN, SCENE_OBJECTS, SECOND_SCAN
+from mcap_landmarks.channels import (
+    CLUSTERED_CLOUD,
+    DETECTIONS,
+    ODOMETRY,
+    SCAN,
+    SCAN_OBJECTS,
+    SCENE_OBJECTS,
+    SCENE_VELOCITIES,
+    SECOND_SCAN,
+)
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.inspection.log_frames import LogFrames, frames_of
@@ -21,6 +30,8 @@ from mcap_landmarks.stage import Channel, Connection, RawMessage, Readable
 
 _TIMED = (SCAN, SECOND_SCAN, DETECTIONS, SCENE_OBJECTS)
 """Channels that meet others by their stamps, beside odometry; what is held, or an image alone, does not."""
+_MADE = (SCAN_OBJECTS, CLUSTERED_CLOUD, SCENE_OBJECTS, SCENE_VELOCITIES)
+"""Results that have the stamps of what they were made from, also where its clock was set back."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +75,13 @@ class Examiner:
         if self._frames is None:
             self._frames = frames_of(log, self._own)
         odometry = frozenset(entry for entry, channel in asked.inputs.items() if channel == ODOMETRY)
-        timed = [
-            entry
-            for entry, channel in asked.inputs.items()
-            if channel in _TIMED and (channel == DETECTIONS or entry not in asked.made)
-        ]
+        timed = _raw(asked)
         self._read(log, odometry, timed)
         base = self._base(log, asked, odometry)
         shifts_ns, first_ns = self._shifts(asked, odometry)
+        if len(shifts_ns) > 1:
+            timed += (made := _stamped_as_made(asked))
+            self._read(log, odometry, made)
         clocks = {
             entry: replace(
                 clock_of(*_columns(self._times[entry]), shifts_ns, first_ns), offset_ns=asked.offsets_ns.get(entry, 0)
@@ -142,6 +152,17 @@ class Examiner:
                 lambda frame: frames.base_from(base, frame, f"odometry on {topic} is"),
             )
         return self._odometry[key]
+
+
+def _raw(asked: Asked) -> list[Connection]:
+    """The connections whose messages meet others by stamps of drivers."""
+    timed = [entry for entry, channel in asked.inputs.items() if channel in _TIMED]
+    return [entry for entry in timed if asked.inputs[entry] == DETECTIONS or entry not in asked.made]
+
+
+def _stamped_as_made(asked: Asked) -> list[Connection]:
+    """The connections of results that have their sources' stamps."""
+    return [entry for entry, channel in asked.inputs.items() if channel in _MADE and entry in asked.made]
 
 
 def _columns(times: "tuple[array[int], array[int]]") -> tuple[Times, Times]:

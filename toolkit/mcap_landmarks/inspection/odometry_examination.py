@@ -13,28 +13,21 @@ from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.estimation.odometry_pieces import NO_PIECE, Pieces, find_pieces
 from mcap_landmarks.geometry.angles import yaw_from_quaternion
 from mcap_landmarks.geometry.frames import plain, planar
-from mcap_landmarks.geometry.se2 import Array, between, compose, exp, inverse
+from mcap_landmarks.geometry.se2 import Array, between, compose, inverse
 from mcap_landmarks.inspection.log_frames import is_robot
+from mcap_landmarks.inspection.odometry_use import ALWAYS, CHOOSE, added_up, usable_messages
 from mcap_landmarks.messages.poses import Odometry
 from mcap_landmarks.recording.clocks import Clock, Times
 from mcap_landmarks.recording.odometry_track import OdometryTrack
 
 _NUMBERS = 22
 """Of each message: position, quaternion, covariance of x, y and heading, linear and angular velocity."""
-_LOST_M2 = 1e3
-"""Nodes that lost their way say so with variances of 1,000 m^2 and more (RTAB-Map: 9,999)."""
-_ALWAYS = 0.9
-"""What more than this share of all messages says is how the driver fills them, and tells nothing."""
-_MOVED_M, _MOVED_RAD = 0.3, 0.3
-"""A twist that adds up to less is noise of a standing robot."""
 _FASTEST_MPS = 70.0
 """Odometry that usually is faster is not in metres."""
 _LYING = 0.5
 """The cosine between up and the z axis of the odometry's frame, below which that frame does not lie flat."""
-_CHOOSE = "choose another topic with --odom TOPIC, or go on without odometry by --odom none"
 
 STRAY = "whose stamp cannot be: it is zero, or far before or after the others'"
-_NOT_FINITE = "odometry messages with numbers that are not finite"
 
 BaseFromFrame = Callable[[str], Array]
 """The transform (4, 4) from a frame to the base's; raises RecordingError where nothing leads there."""
@@ -99,17 +92,18 @@ def examine(topic: str, messages: OdometryMessages, clock: Clock, base_from: Bas
         rows = _own(topic, messages)
         times_ns, rows = _in_time(messages, rows, clock, dropped)
         values = np.array(messages.numbers).reshape(-1, _NUMBERS)[rows]
-        usable, by_twist = _usable(topic, values, times_ns, dropped)
+        usable, by_twist = usable_messages(topic, values, times_ns, dropped)
         times_ns, rows, values = times_ns[usable], rows[usable], values[usable]
         if not len(rows):
             return ExaminedOdometry(None, dropped=+dropped)
         frame, child = messages.frames[rows[0]]
         if by_twist:
             told.mended.append(f"the poses of {topic} {by_twist}; its velocities are added up instead")
-            poses = _of_base(_added_up(times_ns, values), base_from(child))
+            poses = _of_base(added_up(times_ns, values), base_from(child))
         else:
             poses = _flat(topic, values, base_from(child), told)
-        track = _track(topic, times_ns, poses, values, dropped, told)
+        segment = _segments(times_ns - clock.offset_ns, np.array(messages.stamp_ns, dtype=np.int64)[rows], clock)
+        track = _track(topic, (times_ns, segment), poses, values, dropped, told)
     except RecordingError as error:
         return ExaminedOdometry(None, str(error), +dropped)
     # What was mended is not where the log's own frame has it.
@@ -133,11 +127,11 @@ def _own(topic: str, messages: OdometryMessages) -> NDArray[np.int64]:
         RecordingError: several frames could be the robot's.
     """
     counts = Counter(child for _, child in messages.frames)
-    known = [child for child, count in counts.items() if count >= (1 - _ALWAYS) / 2 * len(messages)]
+    known = [child for child, count in counts.items() if count >= (1 - ALWAYS) / 2 * len(messages)]
     bases = [child for child in known if is_robot(child)]
     if len(known) > 1 and len(bases) != 1:
         names = ", ".join(sorted(known))
-        raise RecordingError(f"{topic} has odometry of several frames, {names}: these are several robots; {_CHOOSE}")
+        raise RecordingError(f"{topic} has odometry of several frames, {names}: these are several robots; {CHOOSE}")
     own = (bases or known)[0]
     return np.array([i for i, (_, child) in enumerate(messages.frames) if child == own], dtype=np.int64)
 
@@ -160,74 +154,6 @@ def _in_time(
         times.append(latest_ns := moment_ns)
         kept.append(row)
     return np.array(times, dtype=np.int64), np.array(kept, dtype=np.int64)
-
-
-def _usable(
-    topic: str, values: Array, times_ns: NDArray[np.int64], dropped: Counter[str]
-) -> tuple[NDArray[np.bool_], str]:
-    """Which messages (N,) can be used; and if it is their twists that can, what is wrong with their poses.
-
-    Raises:
-        RecordingError: poses have no orientation, and there are no velocities.
-    """
-    finite, turned = np.isfinite(values[:, :7]).all(axis=1), np.abs(np.nan_to_num(values[:, 3:7])).sum(axis=1) > 0
-    posed, driven = finite & turned, np.isfinite(values[:, 16:]).all(axis=1)
-    moves = _moves(times_ns[driven], values[driven])
-    if posed.sum() < len(values) / 2:
-        what = (
-            "have no orientation (their quaternions are zero or NaN)" if np.isfinite(values[:, :3]).any() else "are NaN"
-        )
-        if moves:
-            dropped[_NOT_FINITE] += int((~driven).sum())
-            return np.asarray(driven), what
-        raise RecordingError(
-            f"{topic}: {int((~posed).sum())} of {len(values)} poses {what}, and there are no velocities; {_CHOOSE}"
-        )
-    dropped[_NOT_FINITE] += int((~finite).sum())
-    dropped["odometry messages without orientation (a quaternion of zeros)"] += int((finite & ~turned).sum())
-    if moves and not np.ptp(values[posed, :7], axis=0).any():
-        return np.asarray(posed & driven), "never change"
-    with np.errstate(invalid="ignore"):
-        lost = posed & (values[:, [7, 11]].max(axis=1) >= _LOST_M2)
-    if lost.sum() > _ALWAYS * posed.sum():
-        lost[:] = False
-    dropped["odometry messages that say the robot is lost (variances of 1,000 m^2 and more)"] += int(lost.sum())
-    frozen = _frozen(times_ns, values, posed & driven & ~lost) if moves else np.zeros_like(lost)
-    dropped["odometry messages whose poses stand still while their velocities do not"] += int(frozen.sum())
-    return np.asarray(posed & ~lost & ~frozen), ""
-
-
-def _moves(times_ns: NDArray[np.int64], values: Array) -> bool:
-    """Whether twists tell of a robot that moves."""
-    if len(values) < 2:
-        return False
-    way = np.ptp(_added_up(times_ns, values), axis=0)
-    return bool(max(way[0], way[1]) > _MOVED_M or way[2] > _MOVED_RAD)
-
-
-def _frozen(times_ns: NDArray[np.int64], values: Array, usable: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Messages (N,) whose poses are exactly those before, while the twists add up to more than noise."""
-    rows = np.flatnonzero(usable)
-    same = (values[rows[1:], :7] == values[rows[:-1], :7]).all(axis=1)
-    seconds = np.diff(times_ns[rows]) / 1e9
-    way = np.abs(values[rows[1:]][:, [16, 17, 21]]) * seconds[:, None] * same[:, None]
-    stretch = np.concatenate([[0], np.cumsum(~same)])  # of each row, the number of its run of equal poses
-    sums = np.zeros((stretch[-1] + 1, 3))
-    np.add.at(sums, stretch[1:], way)
-    moved = (np.hypot(sums[:, 0], sums[:, 1]) > _MOVED_M) | (sums[:, 2] > _MOVED_RAD)
-    found = np.zeros(len(values), dtype=np.bool_)
-    found[rows] = moved[stretch]
-    return found
-
-
-def _added_up(times_ns: NDArray[np.int64], values: Array) -> Array:
-    """Poses (N, 3) from the twists of messages, each step by the mean of those at its ends."""
-    twists = values[:, [16, 17, 21]]
-    steps = exp((twists[1:] + twists[:-1]) / 2 * (np.diff(times_ns) / 1e9)[:, None])
-    poses = np.zeros((len(twists), 3))
-    for i, step in enumerate(steps):
-        poses[i + 1] = compose(poses[i], step)
-    return poses
 
 
 def _of_base(odom_from_child: Array, base_from_child: Array) -> Array:
@@ -253,26 +179,36 @@ def _flat(topic: str, values: Array, base_from_child: Array, told: _Told) -> Arr
     return np.column_stack([places[:, :2], yaw_from_quaternion(odom_from_base.as_quat())])
 
 
+def _segments(times_ns: Times, stamp_ns: Times, clock: Clock) -> Times:
+    """Which setting of its clock each message (N,) is of."""
+    if len(clock.shifts_ns) == 1:
+        return np.zeros(len(times_ns), dtype=np.int64)
+    return np.cumsum(np.diff(times_ns - stamp_ns, prepend=times_ns[:1] - stamp_ns[:1]) != 0)
+
+
 def _track(
     topic: str,
-    times_ns: NDArray[np.int64],
+    times: tuple[Times, Times],
     poses: Array,
     values: Array,
     dropped: Counter[str],
     told: _Told,
 ) -> OdometryTrack:
-    """The track of poses (N, 3).
+    """The track of poses (N, 3) at `times`, of which each has its segment, too.
 
     Raises:
-        RecordingError: they are not in metres, or of several robots.
+        RecordingError: they are not in metres, of several robots, or hardly any two of them go together.
     """
+    times_ns, segment = times
     times_s = (times_ns - times_ns[0]) / 1e9
-    found = find_pieces(times_s, poses)
+    found = find_pieces(times_s, poses, segment)
     if found.places:
         places = " and at ".join(f"({x:.1f}, {y:.1f}) m" for x, y in found.places[:2])
-        raise RecordingError(f"{topic}: several robots publish odometry on it, at {places}, by turns; {_CHOOSE}")
+        raise RecordingError(f"{topic}: several robots publish odometry on it, at {places}, by turns; {CHOOSE}")
     if (speed := _speed(times_s, found)) > _FASTEST_MPS:
-        raise RecordingError(f"{topic}: odometry mostly moves at {speed:.0f} m/s, as if it were in mm; {_CHOOSE}")
+        raise RecordingError(f"{topic}: odometry mostly moves at {speed:.0f} m/s, as if it were in mm; {CHOOSE}")
+    if (gone := int((found.piece == NO_PIECE).sum())) > len(poses) / 2:
+        raise RecordingError(f"{topic}: {gone} of {len(poses)} odometry messages leap away from the others; {CHOOSE}")
     dropped.update(found.dropped)
     if found.bridged:
         leaps = "leap of odometry is" if found.bridged == 1 else "leaps of odometry are"
@@ -280,9 +216,8 @@ def _track(
             f"{found.bridged} {leaps} taken out of {topic}: the robot is taken to have driven on as before"
         )
     if (count := int(found.piece.max(initial=0)) + 1) > 1:
-        told.notes.append(
-            f"odometry on {topic} leaps or was reset: it is cut into {count} pieces that nothing but landmarks joins"
-        )
+        leaps = f"odometry on {topic} leaps, was reset or had its clock set back"
+        told.notes.append(f"{leaps}: it is cut into {count} pieces that nothing but landmarks joins")
     kept = found.piece != NO_PIECE
     covariances = np.zeros((int(kept.sum()), 3, 3))
     covariances[:] = values[kept, 7:16].reshape(-1, 3, 3)

@@ -4,6 +4,8 @@ import struct
 
 from mcap_landmarks.errors import MessageError
 
+SHORTEST = 12
+"""Bytes of the encapsulation and the stamp."""
 _BIG, _LITTLE = struct.Struct(">iI"), struct.Struct("<iI")
 
 
@@ -13,7 +15,7 @@ def stamp_in(data: bytes | memoryview) -> int:
     Raises:
         MessageError: it is too short for one.
     """
-    if len(data) < 12:
+    if len(data) < SHORTEST:
         raise MessageError("it is shorter than a header")
     seconds, rest = (_LITTLE if data[1] & 1 else _BIG).unpack_from(data, 4)
     return int(seconds) * 10**9 + int(rest)

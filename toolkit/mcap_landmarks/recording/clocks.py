@@ -48,11 +48,14 @@ class Clock:
         """
         if (log_time_ns, stamp_ns) in self.strays:
             return None
-        shift_ns = 0
-        if len(self.shifts_ns) > 1 and stamp_ns:
-            late_ns = log_time_ns - stamp_ns - self.delay_ns
-            shift_ns = min(self.shifts_ns, key=lambda shift_ns: abs(late_ns - shift_ns))
-        return (stamp_ns or log_time_ns) + shift_ns + self.offset_ns
+        return (stamp_ns or log_time_ns) + self.shift_ns(log_time_ns, stamp_ns) + self.offset_ns
+
+    def shift_ns(self, log_time_ns: int, stamp_ns: int) -> int:
+        """How far the clock had been set back when a message was stamped."""
+        if len(self.shifts_ns) == 1 or not stamp_ns:
+            return 0
+        late_ns = log_time_ns - stamp_ns - self.delay_ns
+        return min(self.shifts_ns, key=lambda shift_ns: abs(late_ns - shift_ns))
 
 
 def strays(log_ns: Times, stamp_ns: Times) -> NDArray[np.bool_]:

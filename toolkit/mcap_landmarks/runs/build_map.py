@@ -1,7 +1,7 @@
 """Build one landmark map from many logs, and write each log with its results where asked."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +13,7 @@ from mcap_landmarks.mapping.built_map import BuiltMap
 from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.maps.database import read_map, write_map
 from mcap_landmarks.progress import Watch, unwatched
+from mcap_landmarks.runs.bundles import Reading
 from mcap_landmarks.runs.map_plan import LogPlan, MapPlan, MapTask, plan_map
 from mcap_landmarks.runs.map_results import (
     VERB,
@@ -24,6 +25,7 @@ from mcap_landmarks.runs.map_results import (
     write_log,
     write_part,
 )
+from mcap_landmarks.runs.original_stamps import trajectory_as_stamped
 from mcap_landmarks.runs.pipeline import told
 from mcap_landmarks.runs.replacing import check_apart, check_replaceable, earlier_map, earlier_recording
 from mcap_landmarks.runs.session import Session, StageRun, open_session, parts_folder
@@ -70,14 +72,14 @@ def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
     """Run what is missing, gather what every log saw, solve, and write the database."""
     reason = why_anew(plan)
     seen = [_observe(plan, log, reason, parts, watch) for log in plan.logs]
-    logs = [mapped for mapped, _ in seen]
+    logs = [mapped for mapped, _, _ in seen]
     with watch("solve", None, "steps"):
-        built = _solve(plan, logs, [observations for _, observations in seen])
+        built = _solve(plan, logs, [observations for _, observations, _ in seen])
     landmark_map, trajectories, termination, left_out = built
     logs = [_told(log, count) for log, count in zip(logs, left_out or (0,) * len(logs), strict=True)]
-    for log, trajectory in zip(plan.logs, trajectories, strict=True):
+    for log, trajectory, (_, _, shifts_ns) in zip(plan.logs, trajectories, seen, strict=True):
         if log.request.recording in plan.task.outputs:
-            write_part(plan, log, landmark_map, trajectory, parts)
+            write_part(plan, log, landmark_map, trajectory_as_stamped(trajectory, shifts_ns), parts)
     build = StageRun(STAGE.name, "ran", reason, build_outcome(plan, termination))
     run = MapRun(landmark_map, build, tuple(logs), termination)
     fingerprints = tuple(log.fingerprint for log in logs)
@@ -97,17 +99,20 @@ def _told(log: MappedLog, left_out: int) -> MappedLog:
     return replace(log, outcome=replace(log.outcome, dropped=dropped))
 
 
-def _observe(plan: MapPlan, log: LogPlan, reason: str, parts: Path, watch: Watch) -> tuple[MappedLog, LogObservations]:
-    """Run the stages that a log lacks, and gather what it saw."""
+_Observed = tuple[MappedLog, LogObservations, Mapping[int, int]]
+
+
+def _observe(plan: MapPlan, log: LogPlan, reason: str, parts: Path, watch: Watch) -> _Observed:
+    """Run the stages that a log lacks, and gather what it saw; by log time, how far its clock had been set back."""
     with open_session(log.request, parts, plan.task.outputs.get(log.request.recording)) as session:
         runs = [session.work(step, watch) for step in log.steps]
-        observations, outcome = _collect(plan, log, session, watch)
+        observations, reading, outcome = _collect(plan, log, session, watch)
     notes, losses = told([*runs, StageRun(STAGE.name, "ran", reason, outcome)], [], [])
     outcome = replace(outcome, losses=losses, notes=notes)
-    return MappedLog(log.request.recording, log.fingerprint, tuple(runs), outcome), observations
+    return MappedLog(log.request.recording, log.fingerprint, tuple(runs), outcome), observations, reading.shifts_ns
 
 
-def _collect(plan: MapPlan, log: LogPlan, session: Session, watch: Watch) -> tuple[LogObservations, Outcome]:
+def _collect(plan: MapPlan, log: LogPlan, session: Session, watch: Watch) -> tuple[LogObservations, Reading, Outcome]:
     """Observations of one log.
 
     Raises:
@@ -123,7 +128,8 @@ def _collect(plan: MapPlan, log: LogPlan, session: Session, watch: Watch) -> tup
             f"{source.path}: none of {observations.bundles} bundles has odometry within 2 s; check that the clocks of "
             "odometry and scene objects agree"
         )
-    return replace(observations, fingerprint=log.fingerprint), outcome_of(source.reading, notes=source.notes)
+    outcome = outcome_of(source.reading, notes=source.notes)
+    return replace(observations, fingerprint=log.fingerprint), source.reading, outcome
 
 
 def _solve(plan: MapPlan, logs: Sequence[MappedLog], observations: Sequence[LogObservations]) -> BuiltMap:

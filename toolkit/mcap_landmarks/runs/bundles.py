@@ -17,14 +17,17 @@ from mcap_landmarks.inspection.odometry_examination import STRAY
 from mcap_landmarks.inspection.topic_roles import ROLES, Choice, choose, could_be, message_type
 from mcap_landmarks.lidar.scan_repair import ScanTopic
 from mcap_landmarks.maps.scene_objects import usable
+from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
+from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.spatial_objects import SpatialObjects
 from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.messages.velocities import SceneVelocities
 from mcap_landmarks.moments import moment
 from mcap_landmarks.recording.odometry_track import OdometryTrack
 from mcap_landmarks.recording.time_association import Association, associate
@@ -40,7 +43,7 @@ Frames = Mapping[Connection, str]
 """The frames of several cameras, by the connections of their images and CameraInfos."""
 Images = Mapping[Connection, CameraImages]
 """The images that CameraInfos go with, by the connections of these."""
-_Timed = LaserScan | PointCloud2 | Detections | SceneObjects
+_Timed = ScanObjects | ClusteredCloud | SceneVelocities | LaserScan | PointCloud2 | Detections | SceneObjects
 """Messages that meet others by their stamps."""
 
 
@@ -63,6 +66,8 @@ class Reading:
     unreadable: Counter[str] = field(default_factory=Counter)
     topics: dict[str, str] = field(default_factory=dict)
     """The log's own topic for a channel's."""
+    shifts_ns: dict[int, int] = field(default_factory=dict)
+    """By log time, how far stamps were moved since their clock had been set back: results have them as they were."""
 
     def name(self, inputs: Mapping[Connection, Channel[Message]]) -> None:
         """Note the log's own topics."""
@@ -152,10 +157,14 @@ class Correction:
         odometry = self.examined.odometry if self.examined else None
         return (odometry.track if odometry else None) or OdometryTrack.empty()
 
-    def moment(self, raw: RawMessage, stamp_ns: int) -> int | None:
-        """The stamp that counts, None where a message's is stray."""
+    def moment(self, raw: RawMessage, stamp_ns: int, shifts_ns: dict[int, int]) -> int | None:
+        """The stamp that counts, None where a message's is stray; how far it is moved is noted by log time."""
         clock = self.examined.clocks.get(raw.connection) if self.examined else None
-        return stamp_ns if clock is None or clock.is_plain(stamp_ns) else clock.moment(raw.log_time_ns, stamp_ns)
+        if clock is None or clock.is_plain(stamp_ns):
+            return stamp_ns
+        if shift_ns := clock.shift_ns(raw.log_time_ns, stamp_ns):
+            shifts_ns[raw.log_time_ns] = shift_ns
+        return clock.moment(raw.log_time_ns, stamp_ns)
 
 
 def read_bundles(
@@ -242,7 +251,7 @@ def _corrected(message: Message, raw: RawMessage, correction: Correction, readin
     if raw.connection in correction.frames and isinstance(message, CameraInfo | CompressedImage | Image):
         message = replace(message, frame_id=correction.frames[raw.connection])
     if isinstance(message, _Timed):
-        moment_ns = correction.moment(raw, message.stamp_ns)
+        moment_ns = correction.moment(raw, message.stamp_ns, reading.shifts_ns)
         if moment_ns is None:
             reading.dropped[f"messages of {raw.connection.topic} {STRAY}"] += 1
             return None

@@ -11,6 +11,7 @@ from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.runs.bundles import Reading
+from mcap_landmarks.runs.original_stamps import as_stamped
 from mcap_landmarks.runs.plan import Step
 from mcap_landmarks.runs.stage_input import StageInput
 from mcap_landmarks.runs.tallies import tally
@@ -35,7 +36,8 @@ def run_stage(step: Step, log: StageInput, thinning: Thinning, target: Path, pro
             channel = writes.get((result.channel, result.frame_id)) or writes.get((result.channel, ""))
             if channel is not None:
                 counts.update(tally(result.message))
-                writer.add(Stamped(channel, result.log_time_ns, result.message), stage.name)
+                shift_ns = log.reading.shifts_ns.get(result.log_time_ns, 0)
+                writer.add(Stamped(channel, result.log_time_ns, as_stamped(result.message, shift_ns)), stage.name)
         log.close()
         _check_read(log)
         record = step.record.with_outcome(outcome_of(log.reading, counts, (*log.notes, *notes)))

@@ -50,7 +50,7 @@ _BATCH, _SEQUENCE = 4096, 64
 # apart (some ten of them, with sigmas of a centimetre). They are worth telling apart however small they are: the floor
 # is that of `Evidence.odds_against`.
 _ODDS = Tolerance(1e-300, 1e-3)
-_NO_FRAME = "transforms to odometry that were not written, as its frame has no name, or odometry had to be mended"
+_NO_FRAME = "transforms to odometry not written: odometry names no frame of its own, or had to be mended"
 
 Locate = Callable[[Sequence[SceneObjects], Sequence[OdometryAt | None]], list[Match]]
 
