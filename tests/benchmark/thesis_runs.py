@@ -69,13 +69,27 @@ def call(verb: str, *words: object) -> dict[str, Any]:
     Raises:
         RuntimeError: the verb did not end well.
     """
+    ended = attempt(verb, *words)
+    if ended.code:
+        raise RuntimeError(f"{verb} {' '.join(map(str, words))} ended with {ended.code}: {ended.told}")
+    return ended.document
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """How a verb ended: its exit code, its JSON document, empty where there is none, and what it told on stderr."""
+
+    code: int
+    document: dict[str, Any]
+    told: str
+
+
+def attempt(verb: str, *words: object) -> Ended:
+    """Run a verb as the command line does, however it ends."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = run_command(build(verb), [verb, *map(str, words), "--json"])
-    if code:
-        raise RuntimeError(f"{verb} {' '.join(map(str, words))} ended with {code}: {err.getvalue()}")
-    document: dict[str, Any] = json.loads(out.getvalue())
-    return document
+    return Ended(code, json.loads(out.getvalue() or "{}"), err.getvalue())
 
 
 def record_map(folder: Path, seed: int, model: list[str]) -> tuple[Path, Path]:
