@@ -12,7 +12,7 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -34,7 +34,7 @@ SEED = 10_000
 """Rows are of seeds from here on; smaller ones are for development."""
 _DRAWS, _QUICK_DRAWS = 200, 40
 _VERBS = ("map", "localize")
-_SECONDS = {"map": 16.0, "localize": 7.0}
+_SECONDS = {"map": 12.0, "localize": 5.0}
 _EVERY = {"map": 2, "localize": 1}
 """Of the scans of a log only every so manieth is kept: that halves the time of a draw, and the map stays whole."""
 _WORSE = 3.0
@@ -89,13 +89,19 @@ def measure(quick: bool, seed: int, draws: int | None, only: str | None, keep: P
         folder = Path(name)
         clean = _prepare(folder)
         with ProcessPoolExecutor(_PROCESSES) as pool:
-            judged = list(pool.map(partial(_try, folder, clean, keep), drawn))
-    wrong, refused = (sum(getattr(one, field) for one in judged) for field in ("wrong_silently", "refused"))
-    for draw, one in zip(drawn, judged, strict=True):
-        if one.wrong_silently or one.refused:
-            print(f"{draw.kind.name}, seed {draw.seed}: {one.seen}", file=sys.stderr)
+            wrong, refused = _counted(drawn, pool.map(partial(_try, folder, clean, keep), drawn))
     yield Row("wrong_silently", wrong / count, "", at_most=0.01, cases=count)
     yield Row("refused_needlessly", refused / count, "", at_most=0.05, cases=count)
+
+
+def _counted(drawn: Iterable[Draw], judged: Iterable[Judged]) -> tuple[int, int]:
+    """How many draws went wrong without a word, and were refused; each of them is told as it comes."""
+    wrong = refused = 0
+    for draw, one in zip(drawn, judged, strict=True):
+        wrong, refused = wrong + one.wrong_silently, refused + one.refused
+        if one.wrong_silently or one.refused:
+            print(f"{draw.kind.name}, seed {draw.seed}: {one.seen}", file=sys.stderr, flush=True)
+    return wrong, refused
 
 
 def draws_of(seed: int, count: int, only: str | None = None) -> list[Draw]:
