@@ -146,10 +146,10 @@ def image_gap(log: Log, rng: np.random.Generator) -> Log:
 
 
 def _stretch(log: Log, rng: np.random.Generator) -> list[int]:
-    """The rows of 2 to 20 messages of a topic, one after the other."""
+    """The rows of 2 to 10 messages of a topic, one after the other."""
     rows = rows_of(log, any_of(STAMPED, rng))
-    first = int(rng.integers(len(rows) - 20))
-    return rows[first : first + int(rng.integers(2, 21))]
+    first = int(rng.integers(len(rows) - 10))
+    return rows[first : first + int(rng.integers(2, 11))]
 
 
 def duplicates(log: Log, rng: np.random.Generator) -> Log:
