@@ -23,7 +23,7 @@ from tests.benchmark.log_edits import (
     any_of,
     by_time,
     changed,
-    moment,
+    moment_in,
     one_row,
     rows_of,
     stamped,
@@ -104,12 +104,12 @@ def _set_back(log: Log, from_ns: int, by_ns: int) -> Log:
 
 def clock_restarted(log: Log, rng: np.random.Generator) -> Log:
     """The clock of the whole robot is set back by a second up to a day, from somewhere on."""
-    return _set_back(log, moment(log, rng, 0.2, 0.8), round(10 ** rng.uniform(0, 5) * SECOND_NS))
+    return _set_back(log, moment_in(log, rng, 0.2, 0.8), round(10 ** rng.uniform(0, 5) * SECOND_NS))
 
 
 def clock_begins_again(log: Log, rng: np.random.Generator) -> Log:
     """Simulation time that goes back to where the log began."""
-    from_ns = moment(log, rng, 0.3, 0.7)
+    from_ns = moment_in(log, rng, 0.3, 0.7)
     return _set_back(log, from_ns, from_ns - log[0].log_time_ns)
 
 
@@ -224,7 +224,7 @@ def truncated(log: Log, rng: np.random.Generator) -> Log:
 
 def static_transforms_late(log: Log, rng: np.random.Generator) -> Log:
     """The recorder found the static transforms late."""
-    row, at_ns = one_row(log, TF_STATIC, rng), moment(log, rng, 0.0, 1.0)
+    row, at_ns = one_row(log, TF_STATIC, rng), moment_in(log, rng, 0.0, 1.0)
     return by_time(with_message(log, row, log[row]._replace(log_time_ns=at_ns)))
 
 

@@ -50,7 +50,7 @@ def by_time(messages: Sequence[RawMessage]) -> Log:
     return tuple(sorted(messages, key=lambda raw: raw.log_time_ns))
 
 
-def moment(log: Log, rng: np.random.Generator, low: float, high: float) -> int:
+def moment_in(log: Log, rng: np.random.Generator, low: float, high: float) -> int:
     """A log time at some share of the log."""
     first_ns, last_ns = log[0].log_time_ns, log[-1].log_time_ns
     return first_ns + round(rng.uniform(low, high) * (last_ns - first_ns))
@@ -59,7 +59,7 @@ def moment(log: Log, rng: np.random.Generator, low: float, high: float) -> int:
 def stretch_of_time(log: Log, rng: np.random.Generator, seconds: tuple[float, float]) -> tuple[int, int]:
     """A stretch of log time of so many seconds, as rows from the first and before the last."""
     length_ns = round(rng.uniform(*seconds) * SECOND_NS)
-    first_ns = moment(log, rng, 0.1, 0.9)
+    first_ns = moment_in(log, rng, 0.1, 0.9)
     times_ns = [raw.log_time_ns for raw in log]
     first, last = np.searchsorted(times_ns, [first_ns, first_ns + length_ns])
     return int(first), int(last)

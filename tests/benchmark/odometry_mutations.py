@@ -15,7 +15,7 @@ from tests.benchmark.log_edits import (
     Log,
     by_time,
     changed,
-    moment,
+    moment_in,
     one_row,
     rows_of,
     stamped,
@@ -124,7 +124,7 @@ def odometry_gap(log: Log, rng: np.random.Generator) -> Log:
 
 def odometry_stops(log: Log, rng: np.random.Generator) -> Log:
     """Odometry that ends before the log does."""
-    end_ns, topics = moment(log, rng, 0.5, 0.95), {ODOMETRY.topic, TF.topic}
+    end_ns, topics = moment_in(log, rng, 0.5, 0.95), {ODOMETRY.topic, TF.topic}
     return tuple(raw for raw in log if raw.log_time_ns < end_ns or raw.connection.topic not in topics)
 
 

@@ -1,6 +1,7 @@
 """What a log's stamps, transforms and odometry are worth: found before the log is used, once for all its readers."""
 
 from array import array
+from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -51,12 +52,14 @@ class Asked:
 class Examined:
     """What is known of a log before its messages are associated: where its frames are, which one is the robot's own.
 
-    `clocks` are those of the connections whose messages meet by their stamps.
+    `clocks` are those of the connections whose messages meet by their stamps, `foreign` the frames that few of a
+    connection's messages are in, and that are not its own.
     """
 
     frames: LogFrames
     base: str
     clocks: Mapping[Connection, Clock] = field(default_factory=dict)
+    foreign: Mapping[Connection, frozenset[str]] = field(default_factory=dict)
     odometry: ExaminedOdometry | None = None
 
 
@@ -67,6 +70,7 @@ class Examiner:
         self._span, self._own = (start_ns, end_ns), tuple(own)
         self._frames: LogFrames | None = None
         self._times: dict[Connection, tuple[array[int], array[int]]] = {}
+        self._named: dict[Connection, Counter[str]] = {}
         self._messages: dict[frozenset[Connection], OdometryMessages] = {}
         self._odometry: dict[object, ExaminedOdometry] = {}
 
@@ -88,7 +92,10 @@ class Examiner:
             )
             for entry in timed
         }
-        return Examined(self._frames, base, clocks, self._examined(asked, odometry, base, (shifts_ns, first_ns)))
+        foreign = {entry: self._frames.foreign(base, self._named[entry]) for entry in timed}
+        return Examined(
+            self._frames, base, clocks, foreign, self._examined(asked, odometry, base, (shifts_ns, first_ns))
+        )
 
     def _read(self, log: Readable, odometry: frozenset[Connection], timed: Collection[Connection]) -> None:
         """Read stamps and odometry that are not known yet, in one pass."""
@@ -97,6 +104,7 @@ class Examiner:
         if is_new:
             self._messages[odometry] = OdometryMessages()
         self._times.update({entry: (array("q"), array("q")) for entry in new})
+        self._named.update({entry: Counter() for entry in new})
         wanted = {*new, *(odometry if is_new else ())}
         for raw in log.messages(wanted, *self._span) if wanted else ():
             try:
@@ -109,6 +117,7 @@ class Examiner:
             log_ns, stamp_ns = self._times[raw.connection]
             stamp_ns.append(stamp_in(raw.data))
             log_ns.append(raw.log_time_ns)
+            self._named[raw.connection][plain(frame_in(raw.data))] += 1
             return
         message = odometry_from(decode(message_type(ODOMETRY, raw.connection), raw.data))
         if message is not None:
@@ -117,8 +126,9 @@ class Examiner:
     def _base(self, log: Readable, asked: Asked, odometry: frozenset[Connection]) -> str:
         """The robot's own frame: that of results, what transforms say, else what odometry is of."""
         assert self._frames is not None  # noqa: S101 - `examine` finds them first
-        first = next(iter(log.messages([asked.primary], *self._span)), None)
-        frame = "" if first is None else plain(frame_in(first.data))
+        usual = self._named.get(asked.primary, Counter()).most_common(1)
+        first = None if usual else next(iter(log.messages([asked.primary], *self._span)), None)
+        frame = usual[0][0] if usual else "" if first is None else plain(frame_in(first.data))
         if asked.primary in asked.made and asked.inputs[asked.primary] != DETECTIONS:
             return frame
         base = base_in(self._frames.tree, frame)

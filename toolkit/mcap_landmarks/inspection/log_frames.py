@@ -18,6 +18,8 @@ from mcap_landmarks.stage import Connection, Readable
 
 _MOST_TRANSFORMS = 300
 """So many messages of transforms that may change are read: those of mountings come over and over."""
+_FEW = 0.05
+"""A frame of a smaller share of a topic's messages is not the sensor's: several sensors take turns."""
 _ROBOT = re.compile(r"(^|[/_])(base|robot|body|chassis|vehicle|ego|rover|trunk|footprint)([/_]|\d|$)")
 """What drivers call the robot's own frame, beside REP 105's base_link."""
 
@@ -54,6 +56,28 @@ class LogFrames:
             raise RecordingError(
                 f"{what} in the frame {plain(frame)}, and no transforms lead from there to {plain(base)}; {REMEDY}"
             ) from error
+
+    def foreign(self, base: str, counts: Mapping[str, int]) -> frozenset[str]:
+        """The frames of a topic's messages, with their counts, that are not its own.
+
+        They are those of few messages, and those that nothing connects with the base where most messages' frame is.
+        """
+        usual = max(counts, key=lambda name: counts[name], default="")
+        least, is_known = _FEW * sum(counts.values()), self._leads(base, usual)
+        return frozenset(
+            name
+            for name, count in counts.items()
+            if name != usual and (count < least or (is_known and not self._leads(base, name)))
+        )
+
+    def _leads(self, base: str, frame: str) -> bool:
+        if not frame:
+            return False
+        try:
+            self.tree.lookup(base, frame)
+        except RecordingError:
+            return False
+        return True
 
 
 def frames_of(log: Readable, own: Sequence[Edge] = ()) -> LogFrames:

@@ -112,6 +112,12 @@ class CameraInfo:
     region: Region = Region()
     of_rectified: bool = False
 
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether K or P has a focal length; drivers send zeros where there is no calibration."""
+        focal_px = self.intrinsics[[0, 1], [0, 1]], self.projection[[0, 1], [0, 1]]
+        return any(bool((values > 0).all() and np.isfinite(values).all()) for values in focal_px)
+
     def to_ros(self) -> RosObject:
         """See `Message`."""
         region = make(

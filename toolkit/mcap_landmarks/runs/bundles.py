@@ -1,7 +1,7 @@
 """One recording as the bundles that a stage reads, in one pass."""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS, ODOMETRY, TF_STATIC
 from mcap_landmarks.errors import MessageError, RecordingError
-from mcap_landmarks.geometry.frames import is_rigid
+from mcap_landmarks.geometry.frames import is_rigid, plain
 from mcap_landmarks.inspection.camera_images import CameraImages
 from mcap_landmarks.inspection.examination import Examined
 from mcap_landmarks.inspection.format_checks import told_formats
@@ -144,12 +144,14 @@ class Correction:
     """What is done to messages before they are associated.
 
     `examined` tells clocks, frames and odometry; `frames` are those of several cameras: drivers often give images
-    another one than their CameraInfo. `images` are those that CameraInfos become those of.
+    another one than their CameraInfo. `images` are those that CameraInfos become those of; `calibrated` have some
+    CameraInfo with a focal length, so that one without tells nothing.
     """
 
     examined: Examined | None = None
     frames: Frames = field(default_factory=dict)
     images: Images = field(default_factory=dict)
+    calibrated: Collection[Connection] = ()
 
     @property
     def track(self) -> OdometryTrack:
@@ -165,6 +167,10 @@ class Correction:
         if shift_ns := clock.shift_ns(raw.log_time_ns, stamp_ns):
             shifts_ns[raw.log_time_ns] = shift_ns
         return clock.moment(raw.log_time_ns, stamp_ns)
+
+    def is_foreign(self, connection: Connection, frame: str) -> bool:
+        """Whether a frame is not that of a connection's messages."""
+        return self.examined is not None and plain(frame) in self.examined.foreign.get(connection, ())
 
 
 def read_bundles(
@@ -247,10 +253,16 @@ def decoded(
 
 
 def _corrected(message: Message, raw: RawMessage, correction: Correction, reading: Reading) -> Message | None:
-    """A message with the stamp and in the frame that count, None where its stamp is stray."""
+    """A message with the stamp and in the frame that count, None where these or its numbers cannot be."""
     if raw.connection in correction.frames and isinstance(message, CameraInfo | CompressedImage | Image):
         message = replace(message, frame_id=correction.frames[raw.connection])
+    if isinstance(message, CameraInfo) and raw.connection in correction.calibrated and not message.is_calibrated:
+        reading.dropped[f"messages of {raw.connection.topic} without a focal length, which others have"] += 1
+        return None
     if isinstance(message, _Timed):
+        if correction.is_foreign(raw.connection, message.frame_id):
+            reading.dropped[f"messages of {raw.connection.topic} of another frame than the others"] += 1
+            return None
         moment_ns = correction.moment(raw, message.stamp_ns, reading.shifts_ns)
         if moment_ns is None:
             reading.dropped[f"messages of {raw.connection.topic} {STRAY}"] += 1

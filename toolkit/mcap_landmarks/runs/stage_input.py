@@ -42,8 +42,8 @@ class StageInput:
         self._primaries = [entry for entry, channel in self._inputs.items() if channel == stage.reads[0]]
         self.primary = self._primaries[0]
         cameras = cameras_of(log, span.choice) if {CAMERA_IMAGE, CAMERA_INFO} & {*self._inputs.values()} else NO_CAMERAS
-        images = self._images()
-        self._correction = Correction(self._examined(examiner), self._frames_of(cameras), images)
+        images, self._infos = self._images(), self._calibrated()
+        self._correction = Correction(self._examined(examiner), self._frames_of(cameras), images, self._infos)
         refusal = self._odometry.refusal
         if refusal and ODOMETRY in stage.required:
             raise RecordingError(f"{self.path}: {refusal}")
@@ -97,6 +97,17 @@ class StageInput:
         infos = [entry for entry, channel in self._inputs.items() if channel == CAMERA_INFO]
         return images_of(self._log, self._span.choice, infos) if infos else {}
 
+    def _calibrated(self) -> dict[Connection, RawMessage]:
+        """The first message with a focal length of each connection of CameraInfo that has one."""
+        found = {}
+        for connection in (entry for entry, channel in self._inputs.items() if channel == CAMERA_INFO):
+            for raw in self._log.messages([connection]):
+                with contextlib.suppress(MessageError):
+                    if decode(CameraInfo, raw.data).is_calibrated:
+                        found[connection] = raw
+                        break
+        return found
+
     def _notes_of(self, images: Mapping[Connection, CameraImages]) -> Iterator[str]:
         for entry, beside in images.items():
             raw = next(iter(self._log.messages([entry])), None)
@@ -136,6 +147,7 @@ class StageInput:
             yield TF_STATIC, start_ns, examined.frames.first
         for connection, channel in self._inputs.items():
             raw = next(iter(self._log.messages([connection])), None) if channel == CAMERA_INFO else None
+            raw = self._infos.get(connection, raw)
             if raw is not None:
                 first = raw._replace(log_time_ns=start_ns)
                 yield from decoded([first], self._inputs, Reading(), self._correction)
