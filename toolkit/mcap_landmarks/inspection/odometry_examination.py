@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mcap_landmarks.errors import RecordingError
-from mcap_landmarks.estimation.odometry_pieces import NO_PIECE, Pieces, find_pieces
+from mcap_landmarks.estimation.odometry_pieces import NO_PIECE, find_pieces
 from mcap_landmarks.geometry.angles import yaw_from_quaternion
 from mcap_landmarks.geometry.frames import plain, planar
 from mcap_landmarks.geometry.se2 import Array, between, compose, inverse
@@ -205,7 +205,7 @@ def _track(
     if found.places:
         places = " and at ".join(f"({x:.1f}, {y:.1f}) m" for x, y in found.places[:2])
         raise RecordingError(f"{topic}: several robots publish odometry on it, at {places}, by turns; {CHOOSE}")
-    if (speed := _speed(times_s, found)) > _FASTEST_MPS:
+    if (speed := _speed(times_s, poses)) > _FASTEST_MPS:
         raise RecordingError(f"{topic}: odometry mostly moves at {speed:.0f} m/s, as if it were in mm; {CHOOSE}")
     if (gone := int((found.piece == NO_PIECE).sum())) > len(poses) / 2:
         raise RecordingError(f"{topic}: {gone} of {len(poses)} odometry messages leap away from the others; {CHOOSE}")
@@ -224,8 +224,7 @@ def _track(
     return OdometryTrack("", times_ns[kept], found.poses[kept], covariances, found.piece[kept], found.slack[kept])
 
 
-def _speed(times_s: Array, found: Pieces) -> float:
-    """The median speed in m/s."""
-    kept = np.flatnonzero(found.piece != NO_PIECE)
-    steps = np.hypot(*np.diff(found.poses[kept, :2], axis=0).T) / np.maximum(np.diff(times_s[kept]), 1e-6)
+def _speed(times_s: Array, poses: Array) -> float:
+    """The median speed in m/s of poses (N, 3) as they are: where all steps are too long, all are leaps."""
+    steps = np.hypot(*np.diff(poses[:, :2], axis=0).T) / np.maximum(np.diff(times_s), 1e-6)
     return float(np.median(steps)) if len(steps) else 0.0

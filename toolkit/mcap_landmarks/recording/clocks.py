@@ -104,10 +104,10 @@ def set_back(log_ns: Times, stamp_ns: Times) -> list[tuple[int, int]]:
         return []
     found, delay_s = [], delays_s(log_ns, stamp_ns)
     for i in np.flatnonzero(np.diff(stamp_ns) < -_BACK_S * 1e9) + 1:
-        # An even number: of two programs that take turns both medians are the mean of theirs.
-        before, after = np.median(delay_s[max(i - _AROUND + 1, 0) : i]), np.median(delay_s[i : i + _AROUND - 1])
-        if after - before > _BACK_S:
-            found.append((int(log_ns[i]), round(float(after - before) * 1e9)))
+        before, after = delay_s[max(i - _AROUND + 1, 0) : i], delay_s[i : i + _AROUND - 1]
+        # Quartiles: where two programs take turns half of the delays on either side are those of the other side.
+        if np.quantile(after, 0.25) - np.quantile(before, 0.75) > _BACK_S:
+            found.append((int(log_ns[i]), round(float(np.median(after) - np.median(before)) * 1e9)))
     return found
 
 
