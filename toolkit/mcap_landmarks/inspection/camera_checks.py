@@ -6,7 +6,7 @@ from mcap_landmarks.channels import CAMERA_INFO
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.fusion.camera_info import NO_INFO
 from mcap_landmarks.fusion.camera_view import camera_from_info
-from mcap_landmarks.inspection.camera_images import CameraImages, images_of, is_rectified
+from mcap_landmarks.inspection.camera_images import CameraImages, first_calibrated, images_of, is_rectified
 from mcap_landmarks.inspection.cameras import info_topic
 from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.inspection.survey import Survey
@@ -37,7 +37,7 @@ def refuse_cameras(recording: Readable, choice: Choice, rectified: bool | None) 
 def _error(
     recording: Readable, connection: Connection, images: CameraImages | None, rectified: bool | None
 ) -> str | None:
-    raw = next(iter(recording.messages([connection])), None)
+    raw = first_calibrated(recording, connection) or next(iter(recording.messages([connection])), None)
     if raw is None:
         return f"{connection.topic} has no messages; {NO_INFO.partition('; ')[2]}"
     try:

@@ -1,5 +1,6 @@
 """The images that go with each CameraInfo of a log: how large they are, and whether they are rectified."""
 
+import contextlib
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -14,7 +15,7 @@ from mcap_landmarks.inspection.topic_roles import Choice, choose
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.header import frame_in
 from mcap_landmarks.messages.images import CameraInfo
-from mcap_landmarks.stage import Connection, Readable
+from mcap_landmarks.stage import Connection, RawMessage, Readable
 from mcap_landmarks.vision.image_size import image_size
 
 _RECTIFIED = re.compile(r"(?:^|_)rect(?:ified)?(?:_|$)")
@@ -92,6 +93,15 @@ def _info_size(recording: Readable, connection: Connection) -> Size | None:
     except (MessageError, StopIteration):
         return None
     return info.width_px, info.height_px
+
+
+def first_calibrated(recording: Readable, connection: Connection) -> RawMessage | None:
+    """The first CameraInfo of a connection that has a focal length; None where none has."""
+    for raw in recording.messages([connection]):
+        with contextlib.suppress(MessageError):
+            if decode(CameraInfo, raw.data).is_calibrated:
+                return raw
+    return None
 
 
 def first_size(recording: Readable, connection: Connection) -> Size | None:

@@ -94,7 +94,8 @@ class CloudSamples:
 class Survey:
     """What a log's sensors gave: the first transform of each parent and child, odometry by topic, what clocks say.
 
-    `infos` and `image_px` are the first CameraInfo and the size of the first image of each topic.
+    Of each topic `infos` has the first CameraInfo with a focal length, if any, and `image_px` the size of the first
+    image.
     """
 
     sensors: list[Sensor] = field(default_factory=list)
@@ -178,6 +179,10 @@ def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
         odometry = odometry_from(decode(message_type(ODOMETRY, raw.connection), raw.data))
         if odometry is not None:
             found.odometry.setdefault(sensor.topic, OdometryMessages()).take(raw.log_time_ns, odometry)
+    if ros_type == CameraInfo.ROS_TYPE:
+        known = found.infos.get(sensor.topic)
+        if known is None or not known.is_calibrated:
+            found.infos[sensor.topic] = decode(CameraInfo, raw.data)
     if not number and ros_type != TFMessage.ROS_TYPE:
         _take_first(raw, sensor, found)
 
@@ -185,9 +190,7 @@ def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
 def _take_first(raw: RawMessage, sensor: Sensor, found: Survey) -> None:
     ros_type = raw.connection.message_type
     sensor.frame = plain(frame_in(raw.data))
-    if ros_type == CameraInfo.ROS_TYPE:
-        found.infos[sensor.topic] = decode(CameraInfo, raw.data)
-    elif ros_type in IMAGES:
+    if ros_type in IMAGES:
         size_px = image_size(decode(IMAGES[ros_type], raw.data))
         if size_px is not None:
             found.image_px[sensor.topic] = size_px

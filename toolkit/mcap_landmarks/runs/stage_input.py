@@ -8,7 +8,7 @@ from typing import Self
 
 from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, DETECTIONS, ODOMETRY, TF_STATIC
 from mcap_landmarks.errors import MessageError, RecordingError, UsageError
-from mcap_landmarks.inspection.camera_images import CameraImages, images_of
+from mcap_landmarks.inspection.camera_images import CameraImages, first_calibrated, images_of
 from mcap_landmarks.inspection.cameras import NO_CAMERAS, Cameras, info_frames
 from mcap_landmarks.inspection.examination import Asked, Examined, Examiner
 from mcap_landmarks.inspection.odometry_examination import ExaminedOdometry
@@ -99,14 +99,9 @@ class StageInput:
 
     def _calibrated(self) -> dict[Connection, RawMessage]:
         """The first message with a focal length of each connection of CameraInfo that has one."""
-        found = {}
-        for connection in (entry for entry, channel in self._inputs.items() if channel == CAMERA_INFO):
-            for raw in self._log.messages([connection]):
-                with contextlib.suppress(MessageError):
-                    if decode(CameraInfo, raw.data).is_calibrated:
-                        found[connection] = raw
-                        break
-        return found
+        infos = [entry for entry, channel in self._inputs.items() if channel == CAMERA_INFO]
+        found = {entry: first_calibrated(self._log, entry) for entry in infos}
+        return {entry: raw for entry, raw in found.items() if raw is not None}
 
     def _notes_of(self, images: Mapping[Connection, CameraImages]) -> Iterator[str]:
         for entry, beside in images.items():
