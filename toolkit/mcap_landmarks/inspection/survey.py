@@ -179,12 +179,16 @@ def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
         odometry = odometry_from(decode(message_type(ODOMETRY, raw.connection), raw.data))
         if odometry is not None:
             found.odometry.setdefault(sensor.topic, OdometryMessages()).take(raw.log_time_ns, odometry)
-    if ros_type == CameraInfo.ROS_TYPE:
-        known = found.infos.get(sensor.topic)
-        if known is None or not known.is_calibrated:
-            found.infos[sensor.topic] = decode(CameraInfo, raw.data)
+    if sensor.role == "camera_info":
+        _look_at_info(raw, sensor, found)
     if not number and ros_type != TFMessage.ROS_TYPE:
         _take_first(raw, sensor, found)
+
+
+def _look_at_info(raw: RawMessage, sensor: Sensor, found: Survey) -> None:
+    known = found.infos.get(sensor.topic)
+    if known is None or not known.is_calibrated:
+        found.infos[sensor.topic] = decode(CameraInfo, raw.data)
 
 
 def _take_first(raw: RawMessage, sensor: Sensor, found: Survey) -> None:
