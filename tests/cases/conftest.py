@@ -7,10 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.cases.steps import cases_folder
+from tests.cases.steps import RECORDINGS, cases_folder
 from tests.cli.calls import call
-
-RECORDINGS = Path(__file__).parents[2] / "recordings"
 
 
 @pytest.fixture(scope="session")

@@ -193,9 +193,10 @@ def choose(recording: Readable, channel: Channel[Message], choice: Choice) -> tu
         return _of_cameras(channel, cameras_of(recording, choice).used, named)
     chosen = _chosen(recording, channel, named, choice)
     found = tuple(connection for topic, connection in named if topic in chosen)
-    if chosen:
+    fitting = tuple(connection for connection in found if connection.message_type in role.types)
+    if chosen and not fitting:
         _check_chosen(recording, role, chosen[0], found)
-    return found
+    return fitting  # two programs may share a topic, with a type each
 
 
 def _chosen(recording: Readable, channel: Channel[Message], named: Named, choice: Choice) -> list[str]:

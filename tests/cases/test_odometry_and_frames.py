@@ -1,0 +1,38 @@
+"""Stamps, odometry and transforms that others recorded: what can be used is, and the rest is refused by name."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.cases.steps import check_case
+
+CASES = (
+    "bitrot_one_chunk",
+    "objects_in_optical_frame",
+    "odom_first_stamp_zero",
+    "odom_jump",
+    "odom_nan_quaternion",
+    "odom_of_camera_link",
+    "odom_one_future_stamp",
+    "odom_reset",
+    "odom_twist_only",
+    "odom_two_robots",
+    "odom_zero_quaternion",
+    "ros1_in_mcap",
+    "schema_short_names",
+    "tf_static_300ms_late",
+    "tf_static_at_the_end",
+    "topic_two_types",
+)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_expected_of_a_case_holds(
+    name: str,
+    case_input: Callable[[str], Path],
+    site: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    check_case(name, case_input(name), site, monkeypatch, capsys)
