@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 from mcap_landmarks.channels import DETECTIONS, ODOMETRY, SCAN, SCAN_OBJECTS, SCENE_OBJECTS
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.inspection.topic_roles import Choice, parse_offsets
+from mcap_landmarks.inspection.time_offsets import parse_offsets
+from mcap_landmarks.inspection.topic_roles import Choice
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.runs.bundles import Span

@@ -18,7 +18,7 @@ from mcap_landmarks.stage import Bundle
 Edge = tuple[str, str, Array]
 
 BASES = (BASE_FRAME, "base_link")
-_WORLDS = (MAP_FRAME, ODOM_FRAME, "odom_combined", "world", "earth")
+WORLDS = (MAP_FRAME, ODOM_FRAME, "odom_combined", "world", "earth")
 
 
 class Mounting:
@@ -68,7 +68,7 @@ def base_in(tree: FrameTree, sensor: str) -> str:
         if name in tree:
             return name
     names = [name for name, _ in tree.chain(sensor)]
-    return next((name for name in reversed(names) if name not in _WORLDS), plain(sensor))
+    return next((name for name in reversed(names) if name not in WORLDS), plain(sensor))
 
 
 def read_extrinsics(path: Location) -> list[Edge]:

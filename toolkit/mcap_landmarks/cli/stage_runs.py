@@ -62,7 +62,8 @@ class Given:
         return [replace(first, recording=log) for log in logs]
 
     def _span(self) -> "Span":
-        from mcap_landmarks.inspection.topic_roles import Choice, parse_offsets, parse_remaps
+        from mcap_landmarks.inspection.time_offsets import parse_offsets
+        from mcap_landmarks.inspection.topic_roles import Choice, parse_remaps
         from mcap_landmarks.runs.bundles import Span
 
         given, scans = self.options, dict(zip(("scan", "second_scan"), self.scans.topics() or (), strict=False))

@@ -1,7 +1,8 @@
 """The frames of a whole log: what its transforms and a file of extrinsics connect, and which one is the robot's own."""
 
+import contextlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 
@@ -13,13 +14,15 @@ from mcap_landmarks.geometry.frames import REMEDY, FrameTree, is_rigid, plain, r
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.transforms import TFMessage, Transform
-from mcap_landmarks.mounting import Edge
-from mcap_landmarks.stage import Connection, Readable
+from mcap_landmarks.mounting import WORLDS, Edge
+from mcap_landmarks.stage import Readable
 
 _MOST_TRANSFORMS = 300
 """So many messages of transforms that may change are read: those of mountings come over and over."""
 _FEW = 0.05
 """A frame of a smaller share of a topic's messages is not the sensor's: several sensors take turns."""
+_STILL_M, _STILL = 1e-3, 1e-6
+"""Transforms that differ by less than a millimetre, and in the quaternion by less than a milliradian, are the same."""
 _ROBOT = re.compile(r"(^|[/_])(base|robot|body|chassis|vehicle|ego|rover|trunk|footprint)([/_]|\d|$)")
 """What drivers call the robot's own frame, beside REP 105's base_link."""
 
@@ -33,12 +36,14 @@ def is_robot(name: str) -> bool:
 class LogFrames:
     """The frames of a log: `tree` connects them, `first` has the first transform of each.
 
-    `parents` has the frames that transforms give several parents, with these.
+    `parents` has the frames that transforms give several parents, with these, and `moving` those that move against
+    their parents: the tree lacks them, since one transform does not tell where they are.
     """
 
     tree: FrameTree
     first: TFMessage | None = None
     parents: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    moving: frozenset[str] = frozenset()
 
     def base_from(self, base: str, frame: str, what: str) -> Array:
         """base_from_frame (4, 4); no difference where the frame is by its name the robot's own, and not connected.
@@ -53,9 +58,11 @@ class LogFrames:
         except RecordingError as error:
             if is_robot(frame) and "optical" not in frame:
                 return np.eye(4)
-            raise RecordingError(
-                f"{what} in the frame {plain(frame)}, and no transforms lead from there to {plain(base)}; {REMEDY}"
-            ) from error
+            if plain(frame) in WORLDS or plain(frame) in self.moving:
+                why, remedy = "which moves against the robot", "record them in a frame that is fixed to it"
+            else:
+                why, remedy = f"and no transforms lead from there to {plain(base)}", REMEDY
+            raise RecordingError(f"{what} in the frame {plain(frame)}, {why}; {remedy}") from error
 
     def foreign(self, base: str, counts: Mapping[str, int]) -> frozenset[str]:
         """The frames of a topic's messages, with their counts, that are not its own.
@@ -80,35 +87,65 @@ class LogFrames:
         return True
 
 
+@dataclass(slots=True)
+class GatheredFrames:
+    """Transforms of a log, one by one: the first of each frame, its parents, and which frames move.
+
+    A frame that /tf_static tells once does not move.
+    """
+
+    first: dict[str, Transform] = field(default_factory=dict)
+    parents: dict[str, dict[str, None]] = field(default_factory=dict)
+    moving: set[str] = field(default_factory=set)
+    fixed: set[str] = field(default_factory=set)
+
+    def take(self, step: Transform, *, is_static: bool) -> None:
+        """One more transform; one that is none is left to whoever needs it."""
+        if not is_rigid(step.translation_m, step.rotation_xyzw):
+            return
+        child = plain(step.child_frame_id)
+        before = self.first.setdefault(child, step)
+        self.parents.setdefault(child, {})[plain(step.frame_id)] = None
+        if is_static:
+            self.fixed.add(child)
+        elif plain(step.frame_id) in WORLDS or not _alike(before, step):
+            self.moving.add(child)
+
+    def frames(self, own: Sequence[Edge] = ()) -> LogFrames:
+        """The frames that the transforms connect; `own` win."""
+        moving = frozenset(self.moving - self.fixed)
+        edges = [
+            (step.frame_id, name, rigid(step.translation_m, step.rotation_xyzw))
+            for name, step in self.first.items()
+            if name not in moving
+        ]
+        several = {child: tuple(names) for child, names in self.parents.items() if len(names) > 1}
+        firsts = TFMessage(tuple(self.first.values())) if self.first else None
+        return LogFrames(FrameTree.of([*edges, *own]), firsts, several, moving)
+
+
 def frames_of(log: Readable, own: Sequence[Edge] = ()) -> LogFrames:
     """The frames of a log, whenever their transforms were logged; `own` are those of a file, which win."""
-    return frames_from(_transforms(log), own)
-
-
-def frames_from(steps: Iterable[Transform], own: Sequence[Edge] = ()) -> LogFrames:
-    """The frames that transforms connect, by the first one of each; `own` win."""
-    first: dict[str, Transform] = {}
-    parents: dict[str, dict[str, None]] = {}
-    for step in steps:
-        if not is_rigid(step.translation_m, step.rotation_xyzw):
-            continue  # what needs it says that it is missing
-        first.setdefault(plain(step.child_frame_id), step)
-        parents.setdefault(plain(step.child_frame_id), {})[plain(step.frame_id)] = None
-    edges = [(step.frame_id, name, rigid(step.translation_m, step.rotation_xyzw)) for name, step in first.items()]
-    several = {child: tuple(names) for child, names in parents.items() if len(names) > 1}
-    return LogFrames(FrameTree.of([*edges, *own]), TFMessage(tuple(first.values())) if first else None, several)
-
-
-def _transforms(log: Readable) -> Iterable[Transform]:
+    found = GatheredFrames()
     connections = [entry.connection for entry in log.channels if entry.connection.message_type == TFMessage.ROS_TYPE]
-    for connection in sorted(connections, key=_may_change):
+    for connection in sorted(connections, key=lambda one: not is_static(one.topic)):
         raws = log.messages([connection])
-        for raw in islice(raws, _MOST_TRANSFORMS) if _may_change(connection) else raws:
-            try:
-                yield from decode(TFMessage, raw.data).transforms
-            except MessageError:
-                continue
+        for raw in raws if is_static(connection.topic) else islice(raws, _MOST_TRANSFORMS):
+            with contextlib.suppress(MessageError):
+                for step in decode(TFMessage, raw.data).transforms:
+                    found.take(step, is_static=is_static(connection.topic))
+    return found.frames(own)
 
 
-def _may_change(connection: Connection) -> bool:
-    return not connection.topic.endswith(TF_STATIC.topic)
+def is_static(topic: str) -> bool:
+    """Whether a topic has transforms that never change."""
+    return topic.endswith(TF_STATIC.topic)
+
+
+def _alike(one: Transform, other: Transform) -> bool:
+    """Whether two transforms of a frame are the same, but for its parent and for rounding."""
+    if plain(one.frame_id) != plain(other.frame_id):
+        return True
+    turned = abs(float(one.rotation_xyzw @ other.rotation_xyzw))
+    scale = float(np.linalg.norm(one.rotation_xyzw) * np.linalg.norm(other.rotation_xyzw))
+    return bool(np.abs(one.translation_m - other.translation_m).max() < _STILL_M) and turned > (1 - _STILL) * scale

@@ -14,7 +14,7 @@ from mcap_landmarks.errors import MessageError
 from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.inspection.cameras import IMAGES
 from mcap_landmarks.inspection.clock_checks import Comparison
-from mcap_landmarks.inspection.log_frames import LogFrames, frames_from
+from mcap_landmarks.inspection.log_frames import GatheredFrames, LogFrames, is_static
 from mcap_landmarks.inspection.odometry_examination import OdometryMessages
 from mcap_landmarks.inspection.open_logs import OpenLog
 from mcap_landmarks.inspection.scan_readings import ScanReadings
@@ -25,7 +25,7 @@ from mcap_landmarks.messages.header import frame_in, stamp_in
 from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
-from mcap_landmarks.messages.transforms import TFMessage, Transform
+from mcap_landmarks.messages.transforms import TFMessage
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.odometry_track import odometry_from
 from mcap_landmarks.sources import merge
@@ -99,7 +99,7 @@ class Survey:
     """
 
     sensors: list[Sensor] = field(default_factory=list)
-    transforms: dict[tuple[str, str], Transform] = field(default_factory=dict)
+    transforms: GatheredFrames = field(default_factory=GatheredFrames)
     odometry: dict[str, OdometryMessages] = field(default_factory=dict)
     returns: dict[str, Returns] = field(default_factory=dict)
     clouds: dict[str, CloudSamples] = field(default_factory=dict)
@@ -116,7 +116,7 @@ class Survey:
     @property
     def edges(self) -> set[tuple[str, str]]:
         """Parent and child of each transform."""
-        return {*self.transforms}
+        return {(parent, child) for child, parents in self.transforms.parents.items() for parent in parents}
 
     @property
     def bases(self) -> set[str]:
@@ -125,7 +125,7 @@ class Survey:
 
     def log_frames(self) -> LogFrames:
         """The frames that the transforms connect."""
-        return frames_from(self.transforms.values())
+        return self.transforms.frames()
 
 
 def survey(log: OpenLog, roles: Mapping[str, Sequence[str]], progress: Progress | None = None) -> Survey:
@@ -159,9 +159,9 @@ def _strides(log: OpenLog) -> dict[str, int]:
 
 def _transforms(raw: RawMessage, found: Survey, seen: Counter[Connection]) -> None:
     seen[raw.connection] += 1
-    if seen[raw.connection] <= _MOST_TRANSFORMS or raw.connection.topic.endswith("_static"):
+    if seen[raw.connection] <= _MOST_TRANSFORMS or is_static(raw.connection.topic):
         for step in decode(TFMessage, raw.data).transforms:
-            found.transforms.setdefault((plain(step.frame_id), plain(step.child_frame_id)), step)
+            found.transforms.take(step, is_static=is_static(raw.connection.topic))
 
 
 def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:

@@ -4,7 +4,6 @@ import contextlib
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from decimal import Decimal, InvalidOperation
 
 from mcap_landmarks import channels
 from mcap_landmarks.errors import UsageError
@@ -40,8 +39,6 @@ class Role:
         return tuple(message.ROS_TYPE for message in (*self.messages, *self.others))
 
 
-_LARGEST_NS = 2**63
-"""Times do not reach further from the epoch."""
 _OF_CAMERAS = (channels.CAMERA_IMAGE, channels.CAMERA_INFO)
 ROLES: Mapping[Channel[Message], Role] = {
     channels.CAMERA_IMAGE: Role("image", "--image", (CompressedImage, Image)),
@@ -57,18 +54,6 @@ ROLES: Mapping[Channel[Message], Role] = {
 
 NO_TOPIC = "none"
 """In place of the topic of odometry: go on without it."""
-OFFSET_ROLES: Mapping[Channel[Message], str] = {
-    channels.ODOMETRY: "odometry",
-    channels.SCAN: "scan",
-    channels.SECOND_SCAN: "second_scan",
-    channels.SCAN_OBJECTS: "scan",
-    channels.CLUSTERED_CLOUD: "scan",
-    channels.DETECTIONS: "image",
-    channels.SCENE_OBJECTS: "scene_objects",
-    channels.SCENE_VELOCITIES: "scene_objects",
-}
-"""The role whose clock stamped a channel's messages. Images keep their stamps, since annotations must match them: what
-was detected in them is corrected when it is read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,29 +83,6 @@ def parse_remaps(texts: Sequence[str]) -> dict[str, str]:
             raise UsageError(f"--remap {text}: write FROM=TO, such as /robot1/odom=/odom")
         remaps[source] = target
     return remaps
-
-
-def parse_offsets(texts: Sequence[str]) -> dict[str, int]:
-    """Role to nanoseconds of texts `ROLE=SECONDS`.
-
-    Raises:
-        UsageError: a role is unknown or named twice, or the seconds are no number.
-    """
-    roles, offsets = list(dict.fromkeys(OFFSET_ROLES.values())), dict[str, int]()
-    for text in texts:
-        role, _, seconds = text.partition("=")
-        if role not in roles:
-            raise UsageError(f"--time-offset {text}: write ROLE=SECONDS with a role of {', '.join(roles)}")
-        if role in offsets:
-            raise UsageError(f"--time-offset {text}: {role} has an offset already; give one")
-        try:
-            offset_ns = Decimal(seconds) * 10**9
-            offsets[role] = round(offset_ns)
-        except (InvalidOperation, ValueError, OverflowError):
-            offset_ns = Decimal("Infinity")
-        if not abs(offset_ns) < _LARGEST_NS:
-            raise UsageError(f"--time-offset {text}: give seconds, such as {role}=-0.5")
-    return offsets
 
 
 def topics_for(role: Role, present: Collection[tuple[str, str]]) -> list[str]:
@@ -193,10 +155,14 @@ def choose(recording: Readable, channel: Channel[Message], choice: Choice) -> tu
         return _of_cameras(channel, cameras_of(recording, choice).used, named)
     chosen = _chosen(recording, channel, named, choice)
     found = tuple(connection for topic, connection in named if topic in chosen)
-    fitting = tuple(connection for connection in found if connection.message_type in role.types)
-    if chosen and not fitting:
+    if chosen and not any(connection.message_type in role.types for connection in found):
         _check_chosen(recording, role, chosen[0], found)
-    return fitting  # two programs may share a topic, with a type each
+    return _of_role(role, found)
+
+
+def _of_role(role: Role, connections: Iterable[Connection]) -> tuple[Connection, ...]:
+    """The connections that fit a role: two programs may share a topic, with a type each."""
+    return tuple(connection for connection in connections if connection.message_type in role.types)
 
 
 def _chosen(recording: Readable, channel: Channel[Message], named: Named, choice: Choice) -> list[str]:

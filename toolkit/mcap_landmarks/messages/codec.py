@@ -1,5 +1,6 @@
 """Message dataclasses to CDR bytes and back."""
 
+from collections.abc import Callable
 from struct import error as struct_error
 from typing import ClassVar, Protocol, Self, TypeVar
 
@@ -23,6 +24,7 @@ class Message(Protocol):
 
 
 M = TypeVar("M", bound=Message)
+T = TypeVar("T")
 
 
 def encode(message: Message) -> bytes:
@@ -39,10 +41,13 @@ def decode(message_type: type[M], data: bytes | memoryview, schema: str = "") ->
     Raises:
         MessageError: the bytes do not fit the type.
     """
+    return read_as(message_type.from_ros, message_type.ROS_TYPE, data, schema)
+
+
+def read_as(take: Callable[[RosObject], T], ros_type: str, data: bytes | memoryview, schema: str = "") -> T:
+    """What `take` makes of a message of a type from CDR bytes; for the rest see `decode`."""
     try:
-        store = typestore_in(message_type.ROS_TYPE, schema) if schema else typestore()
-        return message_type.from_ros(store.deserialize_cdr(data, message_type.ROS_TYPE))
+        store = typestore_in(ros_type, schema) if schema else typestore()
+        return take(store.deserialize_cdr(data, ros_type))
     except (SerdeError, struct_error, IndexError, ValueError, UnicodeDecodeError) as error:
-        raise MessageError(
-            f"{len(data)} bytes are not a {message_type.ROS_TYPE}: {error or type(error).__name__}"
-        ) from error
+        raise MessageError(f"{len(data)} bytes are not a {ros_type}: {error or type(error).__name__}") from error

@@ -25,7 +25,7 @@ from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.scan_objects import ScanObjects
 from mcap_landmarks.messages.scene import SceneObjects
-from mcap_landmarks.messages.spatial_objects import SpatialObjects
+from mcap_landmarks.messages.spatial_objects import seen_from_above
 from mcap_landmarks.messages.transforms import TFMessage
 from mcap_landmarks.messages.velocities import SceneVelocities
 from mcap_landmarks.moments import moment
@@ -280,7 +280,7 @@ def _in_base(scene: SceneObjects, raw: RawMessage, examined: Examined | None) ->
     base_from_frame = examined.frames.base_from(examined.base, scene.frame_id, f"objects on {raw.connection.topic} are")
     if np.array_equal(base_from_frame, np.eye(4)):
         return scene
-    return decode(SpatialObjects, raw.data).seen_from_above(scene, examined.base, base_from_frame)
+    return seen_from_above(scene, raw.data, examined.base, base_from_frame)
 
 
 def _rigid(message: TFMessage, dropped: Counter[str]) -> TFMessage:

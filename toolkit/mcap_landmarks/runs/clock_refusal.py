@@ -8,7 +8,8 @@ from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.inspection.clock_checks import clock_findings
 from mcap_landmarks.inspection.clock_reading import clocks_between
 from mcap_landmarks.inspection.finding import Finding
-from mcap_landmarks.inspection.topic_roles import OFFSET_ROLES, choose
+from mcap_landmarks.inspection.time_offsets import OFFSET_ROLES
+from mcap_landmarks.inspection.topic_roles import choose
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.runs.plan import Step
 from mcap_landmarks.runs.session import Session

@@ -12,7 +12,8 @@ from mcap_landmarks.config import Settings, effective, load, load_files, named_f
 from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.fusion.config import FuseConfig
 from mcap_landmarks.inspection.camera_checks import refuse_cameras
-from mcap_landmarks.inspection.topic_roles import OFFSET_ROLES, ROLES, Choice
+from mcap_landmarks.inspection.time_offsets import OFFSET_ROLES
+from mcap_landmarks.inspection.topic_roles import ROLES, Choice
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RECORDING, StageRecord, code_hash, file_hash, is_generated
 from mcap_landmarks.messages.codec import Message

@@ -12,7 +12,8 @@ from mcap_landmarks.inspection.camera_images import CameraImages, first_calibrat
 from mcap_landmarks.inspection.cameras import NO_CAMERAS, Cameras, info_frames
 from mcap_landmarks.inspection.examination import Asked, Examined, Examiner
 from mcap_landmarks.inspection.odometry_examination import ExaminedOdometry
-from mcap_landmarks.inspection.topic_roles import OFFSET_ROLES, cameras_of, choose, message_type
+from mcap_landmarks.inspection.time_offsets import OFFSET_ROLES
+from mcap_landmarks.inspection.topic_roles import cameras_of, choose, message_type
 from mcap_landmarks.messages.codec import M, Message, decode
 from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.progress import Progress
