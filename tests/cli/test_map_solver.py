@@ -58,7 +58,7 @@ def test_a_map_that_did_not_converge_is_refused_with_what_to_try(
     log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     line = refused(capsys, 1, "map", log, "--map", tmp_path / "a.db", "--set", "build_map.max_iterations=1")
-    assert "a.mcap: poses and landmarks did not converge in 1 iterations; check the odometry" in line
+    assert "a.mcap: poses and landmarks did not converge in 1 iterations; check odometry and clocks" in line
     assert "build_map.max_iterations" in line
     assert "fewer logs" not in line
     assert not (tmp_path / "a.db").exists()

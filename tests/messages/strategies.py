@@ -61,7 +61,9 @@ def scene_objects(draw: st.DrawFn) -> SceneObjects:
     ids = draw(st.lists(text, min_size=n, max_size=n).map(tuple))
     around = draw(boxes(n))
     radii = around.sizes_m[:, 0] / 2 if around else draw(vector(n, elements=st.floats(0, 100)))
-    return SceneObjects(draw(stamp), draw(text), ids, classes, draw(vector(n, 2)), draw(vector(n, 2, 2)), radii, around)
+    places = draw(vector(n, 2))
+    places[~places.any(axis=1)] = 1.0  # where the pose is all zero the box counts: no object is where the robot is
+    return SceneObjects(draw(stamp), draw(text), ids, classes, places, draw(vector(n, 2, 2)), radii, around)
 
 
 @st.composite

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.channels import RESULTS
 from mcap_landmarks.geometry.frames import REMEDY
+from mcap_landmarks.inspection.beam_checks import check_beams
 from mcap_landmarks.inspection.camera_checks import check_camera_infos
 from mcap_landmarks.inspection.cameras import ALL, info_topic
 from mcap_landmarks.inspection.clock_checks import clock_findings
@@ -14,7 +15,7 @@ from mcap_landmarks.inspection.cloud_checks import check_clouds
 from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.inspection.odometry_checks import check_frames, check_odometry, check_stray_stamps
 from mcap_landmarks.inspection.scan_checks import check_scans
-from mcap_landmarks.inspection.survey import Returns, Sensor, Survey, connected
+from mcap_landmarks.inspection.survey import Sensor, Survey, connected
 from mcap_landmarks.moments import moment
 from mcap_landmarks.recording.clocks import set_back, strays
 from mcap_landmarks.recording.time_association import BESIDE_NS, WINDOW_NS
@@ -33,12 +34,6 @@ _OTHER_EPOCH_NS = 5 * 10**9
 """Stamps that are so far from log times are of another clock, or of a log that was recorded from a played one."""
 _MANY = 0.9
 """Where fewer of a sensor's messages have a partner, something is wrong with clocks or rates."""
-_LEAST_SCANS = 10
-"""Fewer scans say nothing about which beams never return."""
-_LEAST_BEAMS = 3
-"""Fewer dark beams side by side are dirt or chance, not something in the way."""
-_MOST_SECTORS = 3
-"""So many dark sectors are named, the longest: the posts of a robot are three or four."""
 _BASES = ("base_footprint", "base_link")
 """What REP 105 and 120 call the robot's own frame."""
 
@@ -56,12 +51,13 @@ def check(found: Survey) -> list[Finding]:
         _partners,
         _frames,
         check_frames,
+        _several,
         _odometry,
         check_odometry,
         _cameras,
         check_camera_infos,
         check_scans,
-        _beams,
+        check_beams,
         check_clouds,
     )
     findings = [finding for one in checks for finding in one(found)]
@@ -135,8 +131,10 @@ def _clocks(found: Survey) -> Iterator[Finding]:
         if abs(apart_ns) > _CLOCKS_APART_NS and not {topic, reference} <= settled:
             level = "problem" if abs(apart_ns) > WINDOW_NS else "warning"
             text = f"against log times its stamps are {_span(apart_ns)} those of {reference}"
+            role = next((one.role for one in found.sensors if one.topic == topic), "")
             remedy = (
-                "synchronise the clocks (chrony, PTP) or let one machine stamp both; what moves is misplaced by so much"
+                f"synchronise the clocks (chrony, PTP) or let one machine stamp both; --time-offset {role}="
+                f"{apart_ns * 1e-9:.3f} puts the log right if that is no delay of a network"
             )
             yield Finding(level, "clock", topic, text, remedy)
 
@@ -170,8 +168,10 @@ def _delay_ns(sensor: Sensor) -> float | None:
     known &= log_ns < (backs[0][0] if backs else np.int64(2**63 - 1))
     if sensor.role == "camera_info" or not known.any():
         return None
-    delay_ns = float(np.median(log_ns[known] - stamp_ns[known]))
-    return min(delay_ns, delay_ns - sensor.sweep_ns, key=abs)
+    delay_ns, sweep_ns = float(np.median(log_ns[known] - stamp_ns[known])), float(sensor.sweep_ns)
+    if sensor.role == "scan" and not sweep_ns and known.sum() > 1:
+        sweep_ns = float(np.median(np.diff(log_ns[known])))  # a LiDAR that turns takes no longer than to the next scan
+    return min(delay_ns, delay_ns - sweep_ns, key=abs)
 
 
 def _span(delay_ns: float) -> str:
@@ -239,6 +239,14 @@ def _without_base(found: Survey, scan: Sensor) -> Finding:
     return Finding("problem", "frames", scan.topic, text, REMEDY)
 
 
+def _several(found: Survey) -> Iterator[Finding]:
+    for role, option in (("scan", "--scan TOPIC, twice to merge two"), ("odometry", "--odom TOPIC")):
+        topics = [sensor.topic for sensor in found.of(role)]
+        if len(topics) > 1:
+            text = f"{' and '.join(topics)} could be the {role}: verbs ask which one"
+            yield Finding("warning", "choice", "", text, f"choose with {option}")
+
+
 def _odometry(found: Survey) -> Iterator[Finding]:
     if not found.of("odometry"):
         text = "there is no odometry: no map can be built, and localize takes every bundle alone"
@@ -258,35 +266,3 @@ def _cameras(found: Survey) -> Iterator[Finding]:
             f"choose with --image TOPIC, several times for several cameras, or --image {ALL} for all with camera_info"
         )
         yield Finding("warning", "camera", "", text, remedy)
-
-
-def _beams(found: Survey) -> Iterator[Finding]:
-    for topic, returns in sorted(found.returns.items()):
-        never = returns.counts == 0
-        if returns.scans < _LEAST_SCANS or not never.any():
-            continue
-        if never.all():
-            text = f"no beam returned anything in {returns.scans} scans"
-            remedy = "compare ranges with range_min and range_max: a driver that sets these wrong hides every hit"
-            yield Finding("problem", "beams", topic, text, remedy)
-            continue
-        sectors = [sector for sector in _sectors(never) if sector[1] >= _LEAST_BEAMS]
-        if sectors:
-            longest = sorted(sectors, key=lambda sector: -sector[1])[:_MOST_SECTORS]
-            where = ", ".join(_degrees(sector, returns) for sector in sorted(longest))
-            text = f"{int(never.sum())} of {len(never)} beams never returned anything in {returns.scans} scans: {where}"
-            remedy = "if nothing was there, nothing is wrong; else free the view, or leave it out with cluster.view_deg"
-            yield Finding("warning", "beams", topic, text, remedy)
-
-
-def _sectors(never: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First beam and number of beams of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], never, [False]]).astype(np.int8)))
-    return [(int(first), int(end - first)) for first, end in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _degrees(sector: tuple[int, int], returns: Returns) -> str:
-    first, count = sector
-    angles = returns.angle_min_rad + returns.angle_increment_rad * np.array([first, first + count - 1])
-    low, high = np.rad2deg(angles).round().astype(int)
-    return f"{low} to {high} deg"

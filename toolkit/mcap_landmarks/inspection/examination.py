@@ -17,9 +17,9 @@ from mcap_landmarks.channels import (
     SCENE_VELOCITIES,
     SECOND_SCAN,
 )
-from mcap_landmarks.errors import MessageError
+from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.geometry.frames import plain
-from mcap_landmarks.inspection.log_frames import LogFrames, frames_of
+from mcap_landmarks.inspection.log_frames import LogFrames, frames_of, told_circle
 from mcap_landmarks.inspection.odometry_examination import ExaminedOdometry, OdometryMessages, examine
 from mcap_landmarks.inspection.topic_roles import message_type
 from mcap_landmarks.messages.codec import Message, decode
@@ -75,9 +75,15 @@ class Examiner:
         self._odometry: dict[object, ExaminedOdometry] = {}
 
     def examine(self, log: Readable, asked: Asked) -> Examined:
-        """What is to be known before the inputs of a stage are associated."""
+        """What is to be known before the inputs of a stage are associated.
+
+        Raises:
+            RecordingError: transforms go round in a circle.
+        """
         if self._frames is None:
             self._frames = frames_of(log, self._own)
+        if circle := self._frames.circle:
+            raise RecordingError(f"{log.path}: {told_circle(circle)}")
         odometry = frozenset(entry for entry, channel in asked.inputs.items() if channel == ODOMETRY)
         timed = _raw(asked)
         self._read(log, odometry, timed)

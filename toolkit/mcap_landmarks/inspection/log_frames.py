@@ -21,6 +21,7 @@ _MOST_TRANSFORMS = 300
 """So many messages of transforms that may change are read: those of mountings come over and over."""
 _FEW = 0.05
 """A frame of a smaller share of a topic's messages is not the sensor's: several sensors take turns."""
+BROKEN_REMEDY = "mend what publishes it, or give --extrinsics FILE"
 _STILL_M, _STILL = 1e-3, 1e-6
 """Transforms that differ by less than a millimetre, and in the quaternion by less than a milliradian, are the same."""
 _ROBOT = re.compile(r"(^|[/_])(base|robot|body|chassis|vehicle|ego|rover|trunk|footprint)([/_]|\d|$)")
@@ -37,13 +38,26 @@ class LogFrames:
     """The frames of a log: `tree` connects them, `first` has the first transform of each.
 
     `parents` has the frames that transforms give several parents, with these, and `moving` those that move against
-    their parents: the tree lacks them, since one transform does not tell where they are.
+    their parents: the tree lacks them, since one transform does not tell where they are. `broken` are those whose
+    transforms are none.
     """
 
     tree: FrameTree
     first: TFMessage | None = None
     parents: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     moving: frozenset[str] = frozenset()
+    broken: frozenset[str] = frozenset()
+
+    @property
+    def circle(self) -> tuple[str, ...]:
+        """Frames whose transforms go round, so that nothing tells where any of them is; empty where none do."""
+        for name in self.tree.parents:
+            seen = [name]
+            while (above := self.tree.parents.get(seen[-1])) is not None and above[0] not in seen:
+                seen.append(above[0])
+            if above is not None and above[0] == name:
+                return (*seen, name)
+        return ()
 
     def base_from(self, base: str, frame: str, what: str) -> Array:
         """base_from_frame (4, 4); no difference where the frame is by its name the robot's own, and not connected.
@@ -60,6 +74,8 @@ class LogFrames:
                 return np.eye(4)
             if plain(frame) in WORLDS or plain(frame) in self.moving:
                 why, remedy = "which moves against the robot", "record them in a frame that is fixed to it"
+            elif plain(frame) in self.broken:
+                why, remedy = "whose transform has a quaternion of zeros or numbers that are not finite", BROKEN_REMEDY
             else:
                 why, remedy = f"and no transforms lead from there to {plain(base)}", REMEDY
             raise RecordingError(f"{what} in the frame {plain(frame)}, {why}; {remedy}") from error
@@ -98,12 +114,14 @@ class GatheredFrames:
     parents: dict[str, dict[str, None]] = field(default_factory=dict)
     moving: set[str] = field(default_factory=set)
     fixed: set[str] = field(default_factory=set)
+    broken: set[str] = field(default_factory=set)
 
     def take(self, step: Transform, *, is_static: bool) -> None:
         """One more transform; one that is none is left to whoever needs it."""
-        if not is_rigid(step.translation_m, step.rotation_xyzw):
-            return
         child = plain(step.child_frame_id)
+        if not is_rigid(step.translation_m, step.rotation_xyzw):
+            self.broken.add(child)
+            return
         before = self.first.setdefault(child, step)
         self.parents.setdefault(child, {})[plain(step.frame_id)] = None
         if is_static:
@@ -121,7 +139,8 @@ class GatheredFrames:
         ]
         several = {child: tuple(names) for child, names in self.parents.items() if len(names) > 1}
         firsts = TFMessage(tuple(self.first.values())) if self.first else None
-        return LogFrames(FrameTree.of([*edges, *own]), firsts, several, moving)
+        broken = frozenset(self.broken - {*self.first})
+        return LogFrames(FrameTree.of([*edges, *own]), firsts, several, moving, broken)
 
 
 def frames_of(log: Readable, own: Sequence[Edge] = ()) -> LogFrames:
@@ -135,6 +154,11 @@ def frames_of(log: Readable, own: Sequence[Edge] = ()) -> LogFrames:
                 for step in decode(TFMessage, raw.data).transforms:
                     found.take(step, is_static=is_static(connection.topic))
     return found.frames(own)
+
+
+def told_circle(circle: Sequence[str]) -> str:
+    """What is to be said of frames whose transforms go round, and what to do."""
+    return f"transforms go round in a circle, {' from '.join(circle)}; stop whatever publishes one of them"
 
 
 def is_static(topic: str) -> bool:

@@ -3,10 +3,12 @@
 from collections.abc import Iterator
 
 from mcap_landmarks.channels import RESULTS
+from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.geometry.frames import REMEDY
 from mcap_landmarks.inspection.finding import Finding
+from mcap_landmarks.inspection.log_frames import BROKEN_REMEDY, LogFrames, told_circle
 from mcap_landmarks.inspection.odometry_examination import STRAY, ExaminedOdometry, OdometryMessages, examine
-from mcap_landmarks.inspection.survey import Survey
+from mcap_landmarks.inspection.survey import Sensor, Survey
 from mcap_landmarks.mounting import base_in
 from mcap_landmarks.recording.clocks import clock_of, set_back, shifts_of, strays
 
@@ -63,13 +65,34 @@ def _examined(found: Survey, topic: str, messages: OdometryMessages) -> Examined
 
 
 def check_frames(found: Survey) -> Iterator[Finding]:
-    """Frames with several parents, and ready-made objects in a frame that nothing connects."""
+    """Transforms that contradict each other, and ready-made objects and scans in a frame that does not tell enough."""
     frames = found.log_frames()
+    if frames.circle:
+        text, _, remedy = told_circle(frames.circle).partition("; ")
+        yield Finding("problem", "frames", "", text, remedy)
+        return
     for child, parents in sorted(frames.parents.items()):
         text = f"{child} has several parents in the transforms: {', '.join(sorted(parents))}"
-        yield Finding("warning", "frames", "", text, "a frame has one parent; the last one logged counts")
+        yield Finding("warning", "frames", "", text, "a frame has one parent: stop whatever publishes the others")
+    for child in sorted(frames.broken):
+        text = f"the transform of {child} has a quaternion of zeros or numbers that are not finite"
+        yield Finding("warning", "frames", "", text, BROKEN_REMEDY)
+    for sensor in found.of("scan"):
+        if not sensor.frame:
+            yield Finding("problem", "frames", sensor.topic, "its messages name no frame", "set it in the driver")
     for sensor in found.of("scene_objects"):
-        base = base_in(frames.tree, sensor.frame)
-        if "optical" in base:
-            text = f"its objects are in the frame {base}, and no transforms lead from there to the robot"
-            yield Finding("problem", "frames", sensor.topic, text, REMEDY)
+        yield from _objects(frames, sensor)
+
+
+def _objects(frames: LogFrames, sensor: Sensor) -> Iterator[Finding]:
+    """Ready-made objects that cannot be brought to the robot's frame."""
+    base = base_in(frames.tree, sensor.frame)
+    if "optical" in base:
+        text = f"its objects are in the frame {base}, and no transforms lead from there to the robot"
+        yield Finding("problem", "frames", sensor.topic, text, REMEDY)
+        return
+    try:
+        frames.base_from(base, sensor.frame, "its objects are")
+    except RecordingError as error:
+        text, _, remedy = str(error).partition("; ")
+        yield Finding("problem", "frames", sensor.topic, text, remedy)

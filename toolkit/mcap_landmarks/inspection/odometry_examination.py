@@ -15,13 +15,16 @@ from mcap_landmarks.geometry.angles import yaw_from_quaternion
 from mcap_landmarks.geometry.frames import plain, planar
 from mcap_landmarks.geometry.se2 import Array, between, compose, inverse
 from mcap_landmarks.inspection.log_frames import is_robot
-from mcap_landmarks.inspection.odometry_use import ALWAYS, CHOOSE, added_up, usable_messages
+from mcap_landmarks.inspection.odometry_use import ALWAYS, CHOOSE, Use, added_up, usable_messages
 from mcap_landmarks.messages.poses import Odometry
 from mcap_landmarks.recording.clocks import Clock, Times
 from mcap_landmarks.recording.odometry_track import OdometryTrack
 
 _NUMBERS = 22
 """Of each message: position, quaternion, covariance of x, y and heading, linear and angular velocity."""
+_TWICE = "odometry messages that repeat the time of another"
+_LOST_NS = 200_000_000
+"""After a longer while without odometry that can be believed it counts as begun anew."""
 _FASTEST_MPS = 70.0
 """Odometry that usually is faster is not in metres."""
 _LYING = 0.5
@@ -92,17 +95,18 @@ def examine(topic: str, messages: OdometryMessages, clock: Clock, base_from: Bas
         rows = _own(topic, messages)
         times_ns, rows = _in_time(messages, rows, clock, dropped)
         values = np.array(messages.numbers).reshape(-1, _NUMBERS)[rows]
-        usable, by_twist = usable_messages(topic, values, times_ns, dropped)
-        times_ns, rows, values = times_ns[usable], rows[usable], values[usable]
+        use = usable_messages(topic, values, times_ns, dropped)
+        segment = _segments(times_ns - clock.offset_ns, np.array(messages.stamp_ns, dtype=np.int64)[rows], clock)
+        segment = (segment + np.cumsum(_resumed(times_ns, use)))[use.usable]
+        times_ns, rows, values = times_ns[use.usable], rows[use.usable], values[use.usable]
         if not len(rows):
             return ExaminedOdometry(None, dropped=+dropped)
         frame, child = messages.frames[rows[0]]
-        if by_twist:
-            told.mended.append(f"the poses of {topic} {by_twist}; its velocities are added up instead")
+        if use.by_twist:
+            told.mended.append(f"the poses of {topic} {use.by_twist}; its velocities are added up instead")
             poses = _of_base(added_up(times_ns, values), base_from(child))
         else:
             poses = _flat(topic, values, base_from(child), told)
-        segment = _segments(times_ns - clock.offset_ns, np.array(messages.stamp_ns, dtype=np.int64)[rows], clock)
         track = _track(topic, (times_ns, segment), poses, values, dropped, told)
     except RecordingError as error:
         return ExaminedOdometry(None, str(error), +dropped)
@@ -149,7 +153,8 @@ def _in_time(
             dropped[f"odometry messages {STRAY}"] += 1
             continue
         if moment_ns <= latest_ns:
-            dropped["odometry messages whose time goes backwards"] += 1
+            twice = moment_ns == latest_ns
+            dropped[_TWICE if twice else "odometry messages whose time goes backwards"] += 1
             continue
         times.append(latest_ns := moment_ns)
         kept.append(row)
@@ -184,6 +189,16 @@ def _segments(times_ns: Times, stamp_ns: Times, clock: Clock) -> Times:
     if len(clock.shifts_ns) == 1:
         return np.zeros(len(times_ns), dtype=np.int64)
     return np.cumsum(np.diff(times_ns - stamp_ns, prepend=times_ns[:1] - stamp_ns[:1]) != 0)
+
+
+def _resumed(times_ns: Times, use: Use) -> NDArray[np.bool_]:
+    """Which messages (N,) are the first after a while in which the robot was lost."""
+    found = np.zeros(len(times_ns), dtype=np.bool_)
+    kept = np.flatnonzero(use.usable)
+    gone = np.concatenate([[0], np.cumsum(use.lost)])
+    since = (gone[kept[1:]] > gone[kept[:-1]]) & (np.diff(times_ns[kept]) > _LOST_NS)
+    found[kept[1:][since]] = True
+    return found
 
 
 def _track(

@@ -121,8 +121,8 @@ def _check(ended: Termination, logs: int) -> None:
     if not ended.converged:
         fewer = "map fewer logs at once, " if logs > 1 else ""
         raise MapError(
-            f"poses and landmarks did not converge in {ended.iterations} iterations; {fewer}check the odometry "
-            "(`info --check`), or set a larger build_map.max_iterations or, where odometry is worse than that, "
+            f"poses and landmarks did not converge in {ended.iterations} iterations; {fewer}check odometry and "
+            "clocks (`info --check`), or set a larger build_map.max_iterations or, where odometry is worse than that, "
             "build_map.odometry_heading_rad"
         )
 

@@ -49,3 +49,16 @@ def flat_box_to_ros(middle_xy: Iterable[float], size_m: float) -> RosObject:
 def object_to_ros(header: RosObject, identity: str, results: list[RosObject], box: RosObject) -> RosObject:
     """A `vision_msgs/Detection3D`."""
     return make("vision_msgs/Detection3D", header=header, results=results, bbox=box, id=identity)
+
+
+def placed(detection: RosObject) -> RosObject | None:
+    """The pose with covariance of a `vision_msgs/Detection3D`, None where only its box tells where it is.
+
+    Detectors often leave the poses of results as they are made, all zero.
+    """
+    first = detection.results[0].pose if detection.results else None
+    if first is None:
+        return None
+    at, middle = first.pose.position, detection.bbox.center.position
+    is_unset = not (at.x or at.y or at.z) and bool(middle.x or middle.y or middle.z) and not first.covariance.any()
+    return None if is_unset else first

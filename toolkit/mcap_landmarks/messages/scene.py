@@ -12,6 +12,7 @@ from mcap_landmarks.messages.hypotheses import (
     hypotheses_from_ros,
     object_to_ros,
     place_to_ros,
+    placed,
     results_to_ros,
 )
 from mcap_landmarks.messages.parts import Array, header_to_ros, make, stamp_from_ros
@@ -68,7 +69,7 @@ class SceneObjects:
         detections = ros.detections
         positions, covariances = np.zeros((len(detections), 2)), np.zeros((len(detections), 2, 2))
         for i, detection in enumerate(detections):
-            first = detection.results[0].pose if detection.results else None
+            first = placed(detection)
             point = (first.pose if first else detection.bbox.center).position
             positions[i] = point.x, point.y
             if first:

@@ -6,6 +6,7 @@ import numpy as np
 
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.messages.codec import read_as
+from mcap_landmarks.messages.hypotheses import placed
 from mcap_landmarks.messages.parts import Array, covariance_from_ros, point_from_ros
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.typestore import RosObject
@@ -29,7 +30,7 @@ def _in_space(ros: RosObject) -> tuple[Array, Array]:
     """Positions (N, 3) and covariances (N, 3, 3) in m^2; without a result the centre of the box, and unknown."""
     positions, covariances = np.zeros((len(ros.detections), 3)), np.zeros((len(ros.detections), 3, 3))
     for i, detection in enumerate(ros.detections):
-        first = detection.results[0].pose if detection.results else None
+        first = placed(detection)
         positions[i] = point_from_ros((first.pose if first else detection.bbox.center).position)
         if first:
             covariances[i] = covariance_from_ros(first.covariance)[:3, :3]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import Outcome
+from mcap_landmarks.maps.database import read_map
 from mcap_landmarks.progress import Watch, unwatched
 from mcap_landmarks.runs.clock_refusal import clock_notes
 from mcap_landmarks.runs.needed_stages import in_order, missing_stages
@@ -60,6 +61,8 @@ def run_stages(
         check_cameras(session.request, session.log, names)
         steps = plan(session.request, session.log, names)
         check_apart([output], [file for step in steps for file in step.files.values()])
+        for path in (step.files["map"] for step in steps if "map" in step.files):
+            read_map(path)  # what is none is refused before hours are spent
         clocks = clock_notes(session, steps)
         runs = [session.work(step, watch) for step in steps]
         notes, losses = write_output(session, output, verb, inputs, watch)

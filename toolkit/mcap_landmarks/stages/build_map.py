@@ -17,6 +17,9 @@ from mcap_landmarks.maps.scene_objects import known_covariances, standing
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import Bundle, OdometryAt, Reduction, Tolerance
 
+FARTHEST_M = 500.0
+"""Nothing that cameras and LiDARs of robots and cars see stands farther away."""
+
 
 def collect(bundles: Iterable[Bundle], config: BuildMapConfig) -> LogObservations:
     """What one log saw: its bundles that have odometry, and their objects, but for those that move."""
@@ -75,9 +78,19 @@ def solve(logs: Sequence[LogObservations], prior: LandmarkMap | None, config: Bu
     """
     if not any(len(log.bundle) or log.dropped for log in logs):
         raise MapError("no bundle holds an object; a map needs scene objects")
+    ranges = np.concatenate([np.zeros(0), *(np.hypot(*log.points_xy.T) for log in logs)])
+    if len(ranges) and (far_m := float(np.median(ranges))) > FARTHEST_M:
+        raise MapError(
+            f"scene objects are {far_m:.0f} m away on the median, as if they were in millimetres; give metres"
+        )
     if config.method == "thesis":
         return solve_as_in_the_thesis(logs)
-    return solve_jointly(logs, prior, config)
+    try:
+        return solve_jointly(logs, prior, config)
+    except RuntimeError as error:  # what the sparse solver raises
+        raise MapError(
+            f"what was seen does not determine a map ({error}); look at positions and covariances"
+        ) from error
 
 
 STAGE = Reduction(
