@@ -74,3 +74,24 @@ def test_few_messages_of_another_frame_are_not_a_topics_own(
 )
 def test_names_of_the_robot(name: str, expected: bool) -> None:
     assert is_robot(name) is expected
+
+
+def test_frames_that_move_against_the_robot_or_have_no_rotation_are_refused_as_such(tmp_path: Path) -> None:
+    found = frames(
+        tmp_path / "log.mcap",
+        Stamped(TF_STATIC, 1, TFMessage((mount("base_link", "eye", 1.0, np.zeros(4)),))),
+        Stamped(TF, 2, TFMessage((mount("odom", "base_link", 0.0), mount("base_link", "arm", 1.0)))),
+        Stamped(TF, 3, TFMessage((mount("odom", "base_link", 0.5), mount("base_link", "arm", 2.0)))),
+    )
+    for name in ("odom", "arm"):
+        with pytest.raises(RecordingError, match=f"in the frame {name}, which moves against the robot"):
+            found.base_from("base_link", name, "objects are")
+    with pytest.raises(RecordingError, match="whose transform has a quaternion of zeros"):
+        found.base_from("base_link", "eye", "objects are")
+    assert not found.circle
+
+
+def test_transforms_that_go_round_are_told(tmp_path: Path) -> None:
+    steps = mount("base_link", "mast", 1.0), mount("mast", "eye", 1.0), mount("eye", "base_link", 1.0)
+    found = frames(tmp_path / "log.mcap", Stamped(TF_STATIC, 1, TFMessage(steps)))
+    assert set(found.circle) == {"base_link", "mast", "eye"}

@@ -13,8 +13,8 @@ COUNT, STEP_NS, SPEED_MPS = 60, 50_000_000, 0.4
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 
 
-def good() -> list[Odometry]:
-    """Three seconds straight ahead, with velocities."""
+def good(count: int = COUNT) -> list[Odometry]:
+    """Straight ahead, with velocities; three seconds of it."""
     return [
         Odometry.planar(
             (i + 1) * STEP_NS,
@@ -23,7 +23,7 @@ def good() -> list[Odometry]:
             np.zeros((3, 3)),
             (SPEED_MPS, 0.0),
         )
-        for i in range(COUNT)
+        for i in range(count)
     ]
 
 
@@ -124,3 +124,31 @@ def test_what_cannot_be_understood_is_refused_with_a_remedy(messages: list[Odome
     assert found.track is None
     assert complaint in found.refusal
     assert "--odom" in found.refusal
+
+
+def test_poses_that_slide_away_from_their_velocities_are_left_out_and_nothing_joins_what_follows() -> None:
+    """As a filter that is put right over a second does it: no step is a leap."""
+    slid = [
+        replace(one, position_m=one.position_m + np.array([0.0, 0.12 * np.clip(i - 100, 0, 10), 0.0]))
+        for i, one in enumerate(good(4 * COUNT))
+    ]
+    found = examined(slid)
+    assert found.track is not None
+    assert found.dropped["odometry messages whose poses move otherwise than their velocities"] > 8
+    assert found.track.piece.tolist() == sorted(found.track.piece.tolist())
+    assert found.track.piece[-1] == 1
+
+
+def test_velocities_of_another_frame_say_nothing_of_poses() -> None:
+    turned = [replace(one, linear_mps=one.linear_mps[[1, 0, 2]]) for one in good()]
+    assert (sum(examined(turned).dropped.values()), way_m(examined(turned))) == (0, pytest.approx(WAY_M))
+
+
+@pytest.mark.parametrize("scale", [0.1, 50.0])
+def test_quaternions_may_be_scaled_but_degrees_are_none(scale: float) -> None:
+    scaled = [replace(one, orientation_xyzw=scale * one.orientation_xyzw) for one in good()]
+    assert not examined(scaled).notes
+    degrees = [replace(one, orientation_xyzw=np.array([0.0, 0.0, 2.0 * i, 1.0])) for i, one in enumerate(good())]
+    (note,) = examined(degrees).notes
+    assert "have no orientation" in note
+    assert way_m(examined(degrees)) == pytest.approx(WAY_M)
