@@ -74,6 +74,8 @@ def test_what_has_one_reading_is_read_so(name: str, sound: LaserScan) -> None:
         with_(range_max_m=np.inf),
         with_(angle_max_rad=0.0),
         with_(angle_min_rad=6.28, angle_max_rad=0.0, angle_increment_rad=-STEP),
+        with_(angle_min_rad=1.57, angle_max_rad=-1.57, angle_increment_rad=-3.14 / 359),
+        with_(angle_min_rad=2.0, angle_max_rad=-2.0, angle_increment_rad=(2 * np.pi - 4.0) / 359),
         with_(angle_min_rad=np.pi, angle_max_rad=-np.pi, angle_increment_rad=2 * np.pi / 360),
         with_(time_increment_s=0.0, scan_time_s=0.0),
         with_(time_increment_s=0.0),
@@ -101,12 +103,33 @@ def test_what_is_as_the_standard_has_it_is_not_touched(change: Change) -> None:
         (with_(angle_min_rad=np.nan), "angle_min is nan"),
         (with_(ranges_m=EMPTY), "a scan of 0 beams"),
         (in_(ranges_m=1e2, range_min_m=1e2, range_max_m=1e2), "neither in metres nor in millimetres"),
+        (in_(ranges_m=1e2), "in millimetres or in centimetres"),
+        (lambda scan: replace(in_(ranges_m=1e2)(scan), range_max_m=0.0), "in millimetres or in centimetres"),
+        (in_(ranges_m=1e2, range_min_m=1e2, range_max_m=200), "in millimetres or in centimetres"),
+        (in_(angle_increment_rad=-1), "the other way round"),
+        (
+            in_(
+                angle_min_rad=ANGLES["angle_min_rad"], angle_max_rad=ANGLES["angle_max_rad"], angle_increment_rad=-57.3
+            ),
+            "the other way round",
+        ),
+        (in_(angle_increment_rad=-57.3), "the other way round"),
+        (with_(angle_min_rad=-1.57, angle_max_rad=1.57, angle_increment_rad=-3.14 / 359), "the other way round"),
+        (with_(angle_min_rad=1.57, angle_max_rad=-1.57, angle_increment_rad=3.14 / 359), "the other way round"),
         (in_(ranges_m=1e6), "neither in metres nor in millimetres"),
     ],
 )
 def test_what_has_no_reading_or_two_is_named(change: Change, words: str) -> None:
     with pytest.raises(MessageError, match=words):
         repaired(change(SOUND))
+
+
+def test_limits_that_are_no_numbers_are_not_set() -> None:
+    scan, done = repaired(replace(SOUND, range_min_m=np.nan, range_max_m=np.nan))
+    assert (scan.range_min_m, scan.range_max_m, done) == (0.0, 0.0, ())
+    np.testing.assert_array_equal(scan.ranges_m, RANGES)
+    scan, done = repaired(replace(SOUND, range_min_m=np.nan, ranges_m=1000 * RANGES))
+    assert (scan.range_min_m, scan.range_max_m, done) == (0.0, 15.0, (MILLIMETRES,))
 
 
 @pytest.mark.parametrize("limit_m", [0.5, 1.0, 4.0])

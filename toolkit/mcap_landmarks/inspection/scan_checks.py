@@ -2,9 +2,13 @@
 
 from collections.abc import Iterator
 
+from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.inspection.survey import Survey
+from mcap_landmarks.lidar.scan_beams import check_level
 from mcap_landmarks.lidar.scan_times import NO_TIMES
+from mcap_landmarks.mounting import base_in
 
 _LONG_NS = 50_000_000
 """A robot of 0.5 m/s moves by 2.5 cm meanwhile, more than a range is unsure."""
@@ -14,7 +18,7 @@ _UNTIMED = "while the robot moves, what scans show is less sure: let the driver 
 
 
 def check_scans(found: Survey) -> Iterator[Finding]:
-    """What is repaired in scans, which of them are not read, and whether they can be de-skewed."""
+    """What is repaired in scans, which of them are not read, and whether they can be de-skewed and are level."""
     for topic, readings in sorted(found.readings.items()):
         for repair, count in sorted(readings.repairs.items()):
             remedy = _UNTIMED if repair == NO_TIMES else _SET_RIGHT
@@ -26,6 +30,7 @@ def check_scans(found: Survey) -> Iterator[Finding]:
             yield Finding(
                 level, "scan", topic, f"{refused} of {readings.looked_at} scans cannot be read: {reason}", _LATER
             )
+    yield from _steep(found)
     for sensor in found.of("scan") if not found.of("odometry") else []:
         if sensor.sweep_ns >= _LONG_NS:
             text = (
@@ -33,3 +38,20 @@ def check_scans(found: Survey) -> Iterator[Finding]:
                 "while the robot moves is less sure"
             )
             yield Finding("warning", "scan", sensor.topic, text, "record odometry")
+
+
+def _steep(found: Survey) -> Iterator[Finding]:
+    """LiDARs whose scan plane is not level by the transforms; whether these lead to them is checked elsewhere."""
+    tree = found.log_frames().tree
+    for sensor in found.of("scan"):
+        if plain(sensor.frame) not in tree:
+            continue
+        try:
+            base_from_lidar = tree.lookup(base_in(tree, sensor.frame), sensor.frame)
+        except RecordingError:
+            continue
+        try:
+            check_level(sensor.frame, base_from_lidar)
+        except RecordingError as error:
+            text, _, remedy = str(error).partition("; ")
+            yield Finding("problem", "scan", sensor.topic, text, remedy)

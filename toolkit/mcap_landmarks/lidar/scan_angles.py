@@ -16,6 +16,8 @@ _DEGREES_TOO: tuple[str, ...] = (DEGREES, INCREMENT_UNSET)
 
 _MOST_RAD, _LEAST_RAD = 2.2 * math.pi, 0.1
 """No scan is of more than a turn, give or take what LiDARs turn too far, and none of less than 6 degrees."""
+_WHOLE = 0.95
+"""So much of a turn is a full one: pi and -pi, and what limits of it lie between, are one direction."""
 _BEAMS_OFF, _SHARE_OFF = 1.5, 0.002
 """Drivers count the beam at angle_max or not, and round to two digits (6.28)."""
 
@@ -64,18 +66,30 @@ def _reading(step: float, span_rad: float, last: int, in_degrees: bool) -> tuple
         return (step, (DEGREES,)) if in_degrees and _fits(step, span_rad, last) else (0.0, ())
     if _fits(turned, span_rad, last) if span_rad else _LEAST_RAD < abs(turned * last) <= _MOST_RAD:
         return turned, (DEGREES,)
-    return (0.0 if in_degrees else _from_limits(span_rad, last)), (INCREMENT_TOO_LARGE,)
+    is_clear = not in_degrees and step * span_rad > 0
+    return (_from_limits(span_rad, last) if is_clear else 0.0), (INCREMENT_TOO_LARGE,)
 
 
 def _fits(step_rad: float, span_rad: float, last: int) -> bool:
-    """Whether so many steps span what limits do, give or take a turn, as limits may lie on both sides of its seam."""
-    off = abs(math.remainder(step_rad * last - span_rad, 2 * math.pi))
-    return off <= _BEAMS_OFF * abs(step_rad) + _SHARE_OFF * abs(span_rad)
+    """Whether so many steps span what limits do, give or take a turn, as limits may lie on both sides of its seam.
+
+    Where they do so with the other sign too and without a turn, the sign or the limits are wrong: that has two readings
+    unless it is a full turn to the left, which begins at pi or, as its limits say, at -pi.
+    """
+    most = _BEAMS_OFF * abs(step_rad) + _SHARE_OFF * abs(span_rad)
+    if abs(step_rad * last + span_rad) <= most and not (step_rad > 0 and abs(span_rad) >= _WHOLE * 2 * math.pi):
+        return False
+    return abs(math.remainder(step_rad * last - span_rad, 2 * math.pi)) <= most
 
 
 def _contradiction(scan: LaserScan) -> str:
     if not scan.angle_increment_rad or not math.isfinite(scan.angle_increment_rad):
         return "a scan has neither angle_increment nor limits: in which directions its beams are is not known"
+    if scan.angle_increment_rad * (scan.angle_max_rad - scan.angle_min_rad) < 0:
+        return (
+            f"a scan's angle_increment contradicts its limits: by {scan.angle_increment_rad:.6g} rad beams do not go "
+            f"from angle_min {scan.angle_min_rad:.6g} to angle_max {scan.angle_max_rad:.6g}, but the other way round"
+        )
     return (
         f"a scan's angle_increment contradicts its limits: {len(scan.ranges_m)} beams, each by "
         f"{scan.angle_increment_rad:.6g} rad on from angle_min {scan.angle_min_rad:.6g}, do not end at angle_max "

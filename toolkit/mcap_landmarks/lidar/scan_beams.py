@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.errors import UsageError
+from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.lidar.beams import Beams, Limits, echoes, sweep
@@ -14,6 +14,28 @@ from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.whole_clouds import BaseFromThen
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scan import LaserScan
+
+_LEAST_LEVEL = 0.5
+"""The cosine of 60 degrees: LiDARs that look ahead at the floor are tilted by less, those on their side by 90."""
+
+
+def check_level(frame: str, base_from_lidar: Array) -> None:
+    """See that a planar LiDAR mounted at `base_from_lidar` (4, 4), upside down or not, scans more or less level.
+
+    Raises:
+        RecordingError: its scan plane is too steep to see what stands on the floor as it is.
+    """
+    if abs(base_from_lidar[2, 2]) < _LEAST_LEVEL:
+        tilt_deg = math.degrees(math.acos(abs(base_from_lidar[2, 2])))
+        raise RecordingError(
+            f"the scan plane of {frames.plain(frame)} is not level: by the transforms it is tilted by {tilt_deg:.0f} "
+            "deg; correct how the LiDAR is mounted, or choose the topic of one that scans level with --scan"
+        )
+
+
+def returns_nothing(scan: LaserScan) -> bool:
+    """Whether no beam of a scan met anything."""
+    return not np.isfinite(echoes(scan.ranges_m, scan.range_min_m, scan.range_max_m)).any()
 
 
 def beams_of(
@@ -28,10 +50,12 @@ def beams_of(
     `stamp_ns` stands in where the message has no stamp. Without `base_from_then` the base stood still meanwhile.
 
     Raises:
+        RecordingError: the plane of a scan is not level.
         UsageError: there is a point cloud, and no heights to cut it at.
     """
     if isinstance(message, PointCloud2):
         return _slice(message, stamp_ns, base_from_lidar, base_from_then, config)
+    check_level(message.frame_id, base_from_lidar)
     places = np.arange(len(message.ranges_m), dtype=np.float64)
     return sweep(
         message.angle_min_rad + places * message.angle_increment_rad,

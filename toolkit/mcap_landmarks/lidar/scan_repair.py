@@ -27,6 +27,12 @@ _LONGEST_M, _SHORTEST_M = 300.0, 2.0
 """The ranges of planar LiDARs lie between these, with room."""
 _BLIND_M = 10.0
 """No planar LiDAR is blind within so much."""
+_CM_PER_M = 100
+_USUAL_M, _BLIND_BY_DESIGN_M, _REACH_M = 15.0, 0.5, 100.0
+"""Read as centimetres, half of what comes back is nearer than the first, and the limits are of a LiDAR that is blind
+within no more than the second and reaches no farther than the third, with room."""
+_INSIDE = 0.95
+"""Of the ranges of a scan so many are within its limits, if both are in the unit that they are taken for."""
 _AT_LIMIT_M = 1e-3
 """As near to the upper limit a range says that there was no echo, see `beams.echoes`."""
 _MOST, _VARIED = 0.5, 0.25
@@ -69,7 +75,7 @@ def repaired(scan: LaserScan, period_s: float = 0.0) -> tuple[LaserScan, tuple[s
 
 def _with_ranges(scan: LaserScan) -> tuple[LaserScan, tuple[str, ...]]:
     """The scan with ranges and limits in metres, without an upper limit that hides most of what came back."""
-    scan, done = _in_metres(scan)
+    scan, done = _in_metres(_with_limits(scan))
     returned = scan.ranges_m[np.isfinite(scan.ranges_m) & (scan.ranges_m > 0)]
     if not (math.isfinite(scan.range_max_m) and scan.range_max_m > max(scan.range_min_m, 0.0)):
         return scan, done
@@ -77,6 +83,15 @@ def _with_ranges(scan: LaserScan) -> tuple[LaserScan, tuple[str, ...]]:
     if len(hidden) > _MOST * len(returned) and len(np.unique(hidden)) > max(_VARIED * len(hidden), 1):
         return replace(scan, range_max_m=math.inf), (*done, HIDING)
     return scan, done
+
+
+def _with_limits(scan: LaserScan) -> LaserScan:
+    """The scan with limits that are numbers: one that is none is not set."""
+    lowest, highest = scan.range_min_m, scan.range_max_m
+    if not (math.isnan(lowest) or math.isnan(highest)):
+        return scan
+    lowest, highest = (0.0 if math.isnan(limit) else limit for limit in (lowest, highest))
+    return replace(scan, range_min_m=lowest, range_max_m=highest)
 
 
 def _in_metres(scan: LaserScan) -> tuple[LaserScan, tuple[str, ...]]:
@@ -94,11 +109,35 @@ def _in_metres(scan: LaserScan) -> tuple[LaserScan, tuple[str, ...]]:
             f"a scan's ranges are neither in metres nor in millimetres: {usual:.6g} is the usual one, and range_max is "
             f"{scan.range_max_m:.6g}"
         )
+    if _can_be_centimetres(scan, usual):
+        raise MessageError(
+            f"a scan's ranges are in millimetres or in centimetres, which of them is not clear: {usual:.6g} is the "
+            f"usual one, range_min is {scan.range_min_m:.6g} and range_max {scan.range_max_m:.6g}"
+        )
     ranges = scan.ranges_m / np.float32(1000)
     return replace(scan, ranges_m=ranges, range_min_m=lowest, range_max_m=highest), (MILLIMETRES,)
 
 
+def _can_be_centimetres(scan: LaserScan, usual: float) -> bool:
+    """Whether ranges that are not in metres make sense as centimetres, be the limits in them, in metres or not set."""
+    if usual > _CM_PER_M * _USUAL_M:
+        return False
+    lowest, highest = max(scan.range_min_m, 0.0), scan.range_max_m
+    if not (math.isfinite(highest) and highest > lowest):
+        highest = math.inf
+    elif highest > _LONGEST_M:  # both limits are in the unit of the ranges
+        lowest, highest = lowest / _CM_PER_M, highest / _CM_PER_M
+        if lowest > _BLIND_BY_DESIGN_M or highest > _REACH_M:
+            return False
+    distinct = _distinct(scan.ranges_m) / _CM_PER_M
+    return float(np.mean((distinct >= lowest) & (distinct <= highest))) >= _INSIDE
+
+
 def _usual(ranges_m: NDArray[np.float32]) -> float:
     """The median of the distinct ranges (N,): what drivers say when nothing came back is one value, however often."""
-    distinct = np.unique(ranges_m[np.isfinite(ranges_m) & (ranges_m > 0)])
+    distinct = _distinct(ranges_m)
     return float(np.median(distinct)) if len(distinct) else 0.0
+
+
+def _distinct(ranges_m: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.unique(ranges_m[np.isfinite(ranges_m) & (ranges_m > 0)])

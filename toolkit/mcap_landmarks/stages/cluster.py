@@ -25,7 +25,7 @@ from mcap_landmarks.lidar.clustering import cluster, shapes_of
 from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.object_tracks import PieceChange, Tracks
 from mcap_landmarks.lidar.objects import Hypotheses
-from mcap_landmarks.lidar.scan_beams import beams_of
+from mcap_landmarks.lidar.scan_beams import beams_of, check_level, returns_nothing
 from mcap_landmarks.lidar.skew import is_timed, offsets_s, skew_covariances, unsure_motion
 from mcap_landmarks.lidar.whole_clouds import CloudObject, WholeCloud, points_in_base, whole_cloud
 from mcap_landmarks.locations import Location
@@ -41,6 +41,7 @@ from mcap_landmarks.vision.prefetch import in_order
 
 _BASES = (BASE_FRAME, "base_link")
 _NOTHING_STANDS = "clouds in which nothing stands on the ground"
+_NOTHING_CAME_BACK = "scans in which no beam returned anything"
 _NO_ODOMETRY = "scans that could not be de-skewed without odometry; what they show is less sure"
 _NO_TIMES = (
     "scans that could not be de-skewed: their beams have no times, and the robot moves; what they show is less sure"
@@ -53,7 +54,7 @@ def process(
     """The objects of every scan, none for a scan that shows none; what could not be de-skewed is counted.
 
     Raises:
-        RecordingError: it is not known where the LiDAR sits.
+        RecordingError: it is not known where the LiDAR sits, or it scans in a plane that is not level.
         UsageError: a point cloud beside a planar scan, and no heights to cut it at, or with the thesis's method, which
             has none.
     """
@@ -79,6 +80,7 @@ def process(
         odom_from_base = None if bundle.odometry is None else bundle.odometry.odom_from_base
         names = tracks.names(bundle.stamp_ns, odom_from_base, places)
         yield Stamped(SCAN_OBJECTS, bundle.log_time_ns, _message(bundle.stamp_ns, base, names, found))
+        yield from _without_returns(bundle)
         if is_skewed:
             yield Omission(bundle.log_time_ns, _NO_ODOMETRY if bundle.odometry is None else _NO_TIMES)
 
@@ -190,20 +192,30 @@ def _skewed(bundle: Bundle, config: ClusterConfig) -> tuple[list[LaserScan | Poi
     return [message for message in scans if not is_timed(message)], np.outer(velocity, velocity)
 
 
+def _without_returns(bundle: Bundle) -> Iterator[Omission]:
+    scans = [_measured(bundle, channel) for channel in (SCAN, SECOND_SCAN)]
+    for scan in scans:
+        if isinstance(scan, LaserScan) and returns_nothing(scan):
+            yield Omission(bundle.log_time_ns, _NOTHING_CAME_BACK)
+
+
 def _measured(bundle: Bundle, channel: Channel[Message]) -> LaserScan | PointCloud2 | None:
     message = bundle.messages.get(channel)
     return message if isinstance(message, LaserScan | PointCloud2) else None
 
 
-def _as_in_the_thesis(bundles: Iterable[Bundle], mounting: Mounting) -> Iterator[Stamped]:
+def _as_in_the_thesis(bundles: Iterable[Bundle], mounting: Mounting) -> Iterator[Stamped | Omission]:
     for bundle in bundles:
         scan = bundle.messages[SCAN]
         if not isinstance(scan, LaserScan):
             raise UsageError("the thesis's method needs a LaserScan; choose it with --scan, or take the default method")
         base = _base_of(bundle, mounting)
-        filtered, found = thesis.scan_objects(scan, bundle.stamp_ns, base, mounting.lookup(bundle, base, scan.frame_id))
+        base_from_lidar = mounting.lookup(bundle, base, scan.frame_id)
+        check_level(scan.frame_id, base_from_lidar)
+        filtered, found = thesis.scan_objects(scan, bundle.stamp_ns, base, base_from_lidar)
         yield Stamped(SCAN_FILTERED, bundle.log_time_ns, filtered)
         yield Stamped(SCAN_OBJECTS, bundle.log_time_ns, found)
+        yield from _without_returns(bundle)
 
 
 def _message(stamp_ns: int, base: str, names: tuple[str, ...], found: Sequence[Hypotheses]) -> ScanObjects:
