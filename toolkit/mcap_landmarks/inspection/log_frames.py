@@ -83,14 +83,15 @@ class LogFrames:
     def foreign(self, base: str, counts: Mapping[str, int]) -> frozenset[str]:
         """The frames of a topic's messages, with their counts, that are not its own.
 
-        They are those of few messages, and those that nothing connects with the base where most messages' frame is.
+        They are those of few messages, and that of a single one that nothing connects with the base, where most
+        messages' frame is connected. A camera of many messages that nothing connects is no stray.
         """
         usual = max(counts, key=lambda name: counts[name], default="")
         least, is_known = _FEW * sum(counts.values()), self._leads(base, usual)
         return frozenset(
             name
             for name, count in counts.items()
-            if name != usual and (count < least or (is_known and not self._leads(base, name)))
+            if name != usual and (count < least or (count == 1 and is_known and not self._leads(base, name)))
         )
 
     def _leads(self, base: str, frame: str) -> bool:
