@@ -5,28 +5,24 @@ from functools import partial
 
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.inspection.clock_checks import Comparison, Sight, compare
+from mcap_landmarks.inspection.log_frames import LogFrames
 from mcap_landmarks.inspection.odometry_examination import ExaminedOdometry
 from mcap_landmarks.inspection.open_logs import OpenLog
 from mcap_landmarks.inspection.sensor_mounts import mount_of
 from mcap_landmarks.inspection.turn_samples import Read, sampled
-from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import STAGE
-from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.header import frame_in
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.scene import SceneObjects
-from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.sources import merge
 from mcap_landmarks.stage import Connection, RawMessage
 
-_MOST_TRANSFORMS = 300
-"""So many messages of /tf are decoded: where sensors are shows soon (`survey`)."""
 _SEEING = ("scan", "scene_objects")
 _COMPARED = (LaserScan.ROS_TYPE, SceneObjects.ROS_TYPE)
 
 
 def clocks_of(
-    log: OpenLog, roles: Mapping[str, Sequence[str]], odometry: Mapping[str, ExaminedOdometry]
+    log: OpenLog, roles: Mapping[str, Sequence[str]], odometry: Mapping[str, ExaminedOdometry], frames: LogFrames
 ) -> list[Comparison]:
     """The comparisons of examined odometry, by topic, with every topic of scans and recorded scene objects."""
     if log.start_ns is None or log.end_ns is None:
@@ -38,7 +34,7 @@ def clocks_of(
     span = log.start_ns, log.end_ns + 1
     found: list[Comparison] = []
     for topic, examined in odometry.items():
-        found += clocks_between(partial(_read, log), span, (topic, examined), sensors, connections)
+        found += clocks_between(partial(_read, log), span, (topic, examined), sensors, frames)
     return found
 
 
@@ -51,22 +47,20 @@ def clocks_between(
     span: tuple[int, int],
     odometry: tuple[str, ExaminedOdometry],
     sensors: Iterable[tuple[str, Connection]],
-    connections: Iterable[Connection],
-    extrinsics: Location | None = None,
+    frames: LogFrames,
 ) -> list[Comparison]:
     """The comparisons of one topic's odometry with sensors (role, connection) that see the robot turn.
 
-    Where a clock was set back, stamps do not tell which of them belong together, and nothing is compared. Of
-    `connections` those with transforms tell how sensors are mounted; `extrinsics` is a file that does.
+    Where a clock was set back, stamps do not tell which of them belong together, and nothing is compared. `frames` tell
+    how sensors are mounted.
     """
     seeing = [(role, one) for role, one in sensors if one.message_type in _COMPARED]
     topic, examined = odometry
     if examined.track is None or examined.delay_ns is None or not seeing:
         return []
-    transforms = list(_transforms(read, connections, span))
     sights = []
     for role, connection in seeing:
-        mount = mount_of(_frame(read, connection, span), transforms, extrinsics)
+        mount = mount_of(_frame(read, connection, span), frames)
         if mount is not None:
             sights.append(Sight(role, connection, mount))
     return compare(read, span, topic, sampled(examined.track, examined.delay_ns), sights)
@@ -82,16 +76,3 @@ def _frame(read: Read, connection: Connection, span: tuple[int, int]) -> str:
         return next((frame_in(raw.data) for raw in read([connection], *span)), "")
     except MessageError:
         return ""
-
-
-def _transforms(read: Read, connections: Iterable[Connection], span: tuple[int, int]) -> Iterator[Transform]:
-    for connection in connections:
-        if connection.message_type != TFMessage.ROS_TYPE:
-            continue
-        for count, raw in enumerate(read([connection], *span)):
-            if count >= _MOST_TRANSFORMS:
-                break
-            try:
-                yield from decode(TFMessage, raw.data).transforms
-            except MessageError:
-                continue

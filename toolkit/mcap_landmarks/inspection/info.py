@@ -114,7 +114,7 @@ def _checked(log: OpenLog, info: LogInfo, watch: Watch) -> LogInfo:
     """What is known of a log when all of it was read: what is damaged, what will cost results, and which verbs fail."""
     with watch(f"check {log.name}", log.size_bytes) as progress:
         found = survey(log, info.roles, progress)
-        found.clocks = clocks_of(log, info.roles, examined_odometry(found))
+        found.clocks = clocks_of(log, info.roles, examined_odometry(found), found.log_frames())
     network, about_it = _network(log) if found.of("image") else (None, [])
     formats = [one for part in log.parts if isinstance(part, McapLog) for one in check_formats(part.recorded)]
     findings = (*formats, *about_it, *check(found))

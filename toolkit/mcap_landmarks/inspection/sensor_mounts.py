@@ -1,18 +1,14 @@
 """How a sensor is mounted, as far as it matters for how it turns: seen from above, and whether upside down."""
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from mcap_landmarks.channels import TF_STATIC
-from mcap_landmarks.errors import ToolkitError
+from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.geometry.frames import plain, planar
 from mcap_landmarks.geometry.se2 import Array
-from mcap_landmarks.locations import Location
-from mcap_landmarks.messages.transforms import TFMessage, Transform
-from mcap_landmarks.mounting import Mounting
-from mcap_landmarks.stage import Bundle
+from mcap_landmarks.inspection.log_frames import LogFrames
+from mcap_landmarks.mounting import base_in
 
 _LEVEL = 0.9
 """A sensor whose z axis leans more (cosine) does not see the robot turn as such."""
@@ -29,16 +25,14 @@ class Mount:
 AT_THE_BASE = Mount(np.zeros(3), 1.0)
 
 
-def mount_of(frame: str, transforms: Iterable[Transform], extrinsics: Location | None = None) -> Mount | None:
-    """How a frame is mounted by transforms; at the base where they do not lead there, None where it is not level."""
-    steps = {plain(step.child_frame_id): step for step in transforms}
-    bundle = Bundle(0, 0, {TF_STATIC: TFMessage(tuple(steps.values()))})
+def mount_of(frame: str, frames: LogFrames) -> Mount | None:
+    """How a frame is mounted; at the base where no transforms lead there, None where it is not level."""
+    base = base_in(frames.tree, frame)
+    if frame.endswith("optical_frame") and base == plain(frame):
+        return None
     try:
-        mounting = Mounting(extrinsics)
-        base_from_sensor = mounting.lookup(bundle, mounting.base(bundle, frame), frame)
-    except ToolkitError:
+        base_from_sensor = frames.tree.lookup(base, frame)
+    except RecordingError:
         return None if frame.endswith("optical_frame") else AT_THE_BASE
     up = float(base_from_sensor[2, 2])
-    if abs(up) < _LEVEL or (frame.endswith("optical_frame") and not steps):
-        return None
-    return Mount(planar(base_from_sensor), 1.0 if up > 0 else -1.0)
+    return Mount(planar(base_from_sensor), 1.0 if up > 0 else -1.0) if abs(up) >= _LEVEL else None

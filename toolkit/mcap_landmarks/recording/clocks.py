@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 Times = NDArray[np.int64]
 
@@ -73,7 +72,8 @@ def strays(log_ns: Times, stamp_ns: Times) -> NDArray[np.bool_]:
 def _astray(log_ns: Times, stamp_ns: Times) -> NDArray[np.bool_]:
     delay_s = delays_s(log_ns, stamp_ns)
     size = min(_AROUND, len(delay_s) - 1 + len(delay_s) % 2)
-    off_s = np.abs(delay_s - median_filter(delay_s, size=size, mode="reflect"))
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(delay_s, size // 2, mode="symmetric"), size)
+    off_s = np.abs(delay_s - np.median(around, axis=1))
     suspect = off_s > _OFF_S
     if not suspect.any():
         return suspect

@@ -55,10 +55,9 @@ def _problems(session: Session, steps: Sequence[Step]) -> list[Finding]:
     compared = clocks_between(
         own.messages,
         span,
-        odometry,
+        odometry[:2],
         [(OFFSET_ROLES[channel], one) for channel in seeing for one in _chosen(session, channel)],
-        [entry.connection for entry in own.channels],
-        session.request.files.get("extrinsics"),
+        odometry[2],
     )
     return [one for one in clock_findings(compared, choice.offsets_ns) if one.level == "problem"]
 

@@ -53,11 +53,11 @@ def make_folder(place: Location) -> Path:
 def no_empty_folder(place: Location) -> Iterator[None]:
     """Take a folder away again that was made in the block, if the block fails and it holds nothing."""
     folder = to_write(place)
-    is_new = not folder.exists()
+    is_new, is_whole = not folder.exists(), False
     try:
         yield
-    except BaseException:
-        if is_new and folder.is_dir():
+        is_whole = True
+    finally:
+        if is_new and not is_whole and folder.is_dir():
             with contextlib.suppress(OSError):
                 folder.rmdir()
-        raise

@@ -61,8 +61,9 @@ def run_stages(
         check_cameras(session.request, session.log, names)
         steps = plan(session.request, session.log, names)
         check_apart([output], [file for step in steps for file in step.files.values()])
-        for path in (step.files["map"] for step in steps if "map" in step.files):
-            read_map(path)  # what is none is refused before hours are spent
+        for step in steps[1:]:  # a map that is none is refused before hours are spent on what comes before
+            if "map" in step.files:
+                read_map(step.files["map"])
         clocks = clock_notes(session, steps)
         runs = [session.work(step, watch) for step in steps]
         notes, losses = write_output(session, output, verb, inputs, watch)

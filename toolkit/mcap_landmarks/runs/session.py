@@ -11,6 +11,7 @@ from mcap_landmarks.atomic import held
 from mcap_landmarks.channels import DRAWN, ODOMETRY, SHARED
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.inspection.examination import Asked, Examiner
+from mcap_landmarks.inspection.log_frames import LogFrames
 from mcap_landmarks.inspection.odometry_examination import ExaminedOdometry
 from mcap_landmarks.inspection.topic_roles import choose, chosen_before
 from mcap_landmarks.manifest import Outcome, StageRecord
@@ -119,15 +120,16 @@ class Session:
         topics = {entry.connection.topic for layer in read for entry in layer.channels}
         return LayeredLog(self.log.path, [self.own_without(topics), *read])
 
-    def odometry(self) -> tuple[str, ExaminedOdometry] | None:
-        """The topic of the log's odometry, and what can be used of it; None where there is none."""
+    def odometry(self) -> tuple[str, ExaminedOdometry, LogFrames] | None:
+        """The topic of the log's odometry, what can be used of it, and the log's frames; None where there is none."""
         own = self.log.without_results()
         with contextlib.suppress(UsageError):  # stages say so
             inputs = dict.fromkeys(choose(own, ODOMETRY, self.request.span.choice), ODOMETRY)
             if inputs:
                 first = next(iter(inputs))
-                examined = self.examiner.examine(own, Asked(inputs, first)).odometry
-                return None if examined is None else (first.topic, examined)
+                examined = self.examiner.examine(own, Asked(inputs, first))
+                if examined.odometry is not None:
+                    return first.topic, examined.odometry, examined.frames
         return None
 
     def work(self, step: Step, watch: Watch) -> StageRun:

@@ -1,4 +1,4 @@
-"""Stamps, odometry and transforms that others recorded: what can be used is, and the rest is refused by name."""
+"""What others recorded and reported: what can be used is, and the rest is refused by name."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +9,9 @@ from tests.cases.steps import check_case
 
 CASES = (
     "bitrot_one_chunk",
+    "info_binning",
+    "info_half_size",
+    "no_odometry",
     "objects_in_optical_frame",
     "odom_first_stamp_zero",
     "odom_jump",
@@ -20,6 +23,10 @@ CASES = (
     "odom_two_robots",
     "odom_zero_quaternion",
     "ros1_in_mcap",
+    "scan_in_degrees",
+    "scan_in_mm",
+    "scan_range_max_zero",
+    "scan_time_increment_us",
     "schema_short_names",
     "tf_static_300ms_late",
     "tf_static_at_the_end",
