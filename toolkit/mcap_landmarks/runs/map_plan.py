@@ -16,6 +16,7 @@ from mcap_landmarks.runs.plan import (
     Step,
     check_cameras,
     choice_options,
+    frame_files,
     inputs_of_stage,
     is_result,
     plan,
@@ -96,7 +97,7 @@ def _plan_log(place: str, config: Config, request: Request, task: MapTask, parts
         steps = tuple(plan(session.request, log, names))
         refuse_clocks(session, steps)
         inputs, options = inputs_of_stage(STAGE, log, steps), choice_options(choice, STAGE.reads)
-        record = record_of(STAGE, config, task.files, inputs, options)
+        record = record_of(STAGE, config, {**task.files, **frame_files(STAGE, request)}, inputs, options)
         return LogPlan(place, session.request, log.recording.fingerprint(), steps, record)
 
 

@@ -89,7 +89,8 @@ def plan(request: Request, log: RecordedLog, names: Sequence[str]) -> list[Step]
         kept = () if earlier is None else stage.choices
         config, files = load_files(stage, request.settings, request.files, generated=generated, kept=kept)
         inputs, options = inputs_of_stage(stage, log, steps), _options(stage, request)
-        record = replace(record_of(stage, config, files.paths, inputs, options), origins=files.origins)
+        read = {**files.paths, **frame_files(stage, request)}
+        record = replace(record_of(stage, config, read, inputs, options), origins=files.origins)
         if earlier is not None:
             hashes = {name: value for name, value in earlier.resources.items() if name in kept}
             origins = {**earlier.origins, **record.origins}
@@ -142,6 +143,12 @@ def inputs_of_stage(stage: Stage | Reduction, log: RecordedLog, steps: Sequence[
 def is_result(channel: Channel[Message], choice: Choice) -> bool:
     """Whether stages read a channel from results, where there are any."""
     return channel.topic.startswith(RESULTS) and channel.topic not in choice.remaps.values()
+
+
+def frame_files(stage: Stage | Reduction, request: Request) -> dict[str, Location]:
+    """The file that tells where frames are: odometry and ready-made objects are brought to the robot's by it."""
+    extrinsics = request.files.get("extrinsics")
+    return {"extrinsics": extrinsics} if extrinsics is not None and ODOMETRY in stage.reads else {}
 
 
 def record_of(

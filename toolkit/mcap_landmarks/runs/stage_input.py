@@ -119,7 +119,7 @@ class StageInput:
 
     def _examined(self, examiner: Examiner | None) -> Examined | None:
         """What is known of stamps, frames and odometry; nothing where the stage looks at images alone."""
-        if self.primary in self._inputs and self._inputs[self.primary] == CAMERA_IMAGE:
+        if self._inputs[self.primary] == CAMERA_IMAGE:
             return None
         examiner = examiner or Examiner(self._span.start_ns, self._span.end_ns)
         made = {entry.connection for layer in self._log.layers if layer.record for entry in layer.channels}
