@@ -5,7 +5,9 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from mcap.reader import make_reader
 from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.recording.writer import create_recording
 
 
 def _expected(records: list[dict]) -> tuple[list[tuple], list[str], set[str], int]:
@@ -52,6 +54,33 @@ def test_every_file_of_the_suite(shared_data: Path, tmp_path: Path) -> None:
                 assert set(recording.metadata) == metadata, name
                 assert len(list(recording.attachments())) == attachments, name
                 assert recording.losses == [], name
+
+
+def test_the_mcap_package_reads_what_we_write_of_every_file(shared_data: Path, tmp_path: Path) -> None:
+    path, written = tmp_path / "file.mcap", tmp_path / "written.mcap"
+    with zipfile.ZipFile(shared_data / "mcap-conformance.zip") as suite:
+        for name in sorted(name for name in suite.namelist() if name.endswith(".mcap")):
+            path.write_bytes(suite.read(name))
+            messages, topics, metadata, attachments = _expected(json.loads(suite.read(name[:-5] + ".json"))["records"])
+            with open_recording(path) as recording, create_recording(written, recording.metadata) as writer:
+                for entry in recording.channels:
+                    writer.declare(entry.connection)
+                for raw in recording.messages():
+                    writer.write(raw)
+                for attachment in recording.attachments():
+                    writer.attach(attachment)
+            with written.open("rb") as stream:
+                reader = make_reader(stream, validate_crcs=True)
+                found = [
+                    (channel.topic, m.log_time, m.publish_time, m.sequence, m.data)
+                    for _, channel, m in reader.iter_messages()
+                ]
+                summary = reader.get_summary()
+                assert found == sorted(messages, key=lambda message: message[1]), name
+                assert summary is not None, name
+                assert sorted(channel.topic for channel in summary.channels.values()) == topics, name
+                assert {record.name for record in reader.iter_metadata()} == metadata, name
+                assert len(list(reader.iter_attachments())) == attachments, name
 
 
 @pytest.mark.parametrize("cut", [0.3, 0.6, 0.95])
