@@ -17,7 +17,7 @@ class DamagedBlockError(ValueError):
     """A chunk that cannot be trusted; the message says why."""
 
 
-def chunk_content(record: bytes, *, verify: bool) -> memoryview:
+def chunk_content(record: bytes | memoryview, *, verify: bool) -> memoryview:
     """The uncompressed records of a chunk, from the content of its record.
 
     Raises:
@@ -58,7 +58,7 @@ def cut_chunk_content(record: bytes) -> memoryview:
     return content[:position]
 
 
-def _header(record: bytes) -> tuple[int, int, str, memoryview, int]:
+def _header(record: bytes | memoryview) -> tuple[int, int, str, memoryview, int]:
     """Uncompressed size, CRC, compression, the data that is there, and how long it should be."""
     try:
         _, _, size, crc = CHUNK.unpack_from(record)

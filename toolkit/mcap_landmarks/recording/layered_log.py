@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import STAGE, StageRecord, stage_records
 from mcap_landmarks.progress import Progress
+from mcap_landmarks.recording.chunk_copy import WholeChunk
+from mcap_landmarks.recording.declared_channels import Declared
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 
@@ -45,6 +47,21 @@ class LayeredLog:
         ]
         return streams[0] if len(streams) == 1 else heapq.merge(*streams, key=_log_time)
 
+    def pieces(
+        self,
+        kept: Collection[Connection],
+        declared: Declared,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+        progress: Progress | None = None,
+    ) -> Iterator[RawMessage | WholeChunk]:
+        """All messages, for a copy; see `Recording.pieces`."""
+        streams = [
+            layer.recording.pieces(wanted, kept, declared, start_ns, end_ns, progress)
+            for layer, wanted in self._wanted(None)
+        ]
+        return streams[0] if len(streams) == 1 else heapq.merge(*streams, key=_log_time)
+
     def size_bytes(
         self,
         connections: Collection[Connection] | None = None,
@@ -74,8 +91,8 @@ class LayeredLog:
         return found
 
 
-def _log_time(raw: RawMessage) -> int:
-    return raw.log_time_ns
+def _log_time(piece: RawMessage | WholeChunk) -> int:
+    return piece.log_time_ns
 
 
 def own_layer(recording: Recording) -> Layer:

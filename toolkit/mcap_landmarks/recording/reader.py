@@ -3,7 +3,7 @@
 import contextlib
 import hashlib
 import heapq
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from functools import cached_property
 from struct import error as struct_error
 from typing import BinaryIO
@@ -13,14 +13,19 @@ from mcap.exceptions import McapError
 
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.locations import Location, to_read
-from mcap_landmarks.manifest import RUN, carried_fingerprint
+from mcap_landmarks.manifest import RUN, STAGE, carried_fingerprint
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.blocks import DamagedBlockError, block_messages
+from mcap_landmarks.recording.chunk_copy import WholeChunk, read_whole
 from mcap_landmarks.recording.container import CHUNK, MAGIC, RECORD, Opcode, parse
+from mcap_landmarks.recording.declared_channels import Declared
 from mcap_landmarks.recording.rebuild_index import index_by_scanning
 from mcap_landmarks.recording.summary_index import Block, Index, index_from_summary, read_record
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 from mcap_landmarks.wording import counted
+
+_Open = list[tuple[int, int, int, list[RawMessage]]]
+"""Blocks that are open: the time of the next message, the number of the block, that of the message, all messages."""
 
 
 @contextlib.contextmanager
@@ -94,7 +99,7 @@ class Recording:
 
     def fingerprint(self) -> str:
         """Identity by content: that of the recording whose results this one carries, else a hash over its blocks."""
-        return self._carried or self._content
+        return self._carried or self._hash(is_foreign=True)
 
     @property
     def is_ours(self) -> bool:
@@ -103,12 +108,15 @@ class Recording:
 
     @cached_property
     def _carried(self) -> str | None:
-        return carried_fingerprint(self.metadata, self._content) if RUN in self.metadata else None
+        return carried_fingerprint(self.metadata, self._hash(is_foreign=False)) if RUN in self.metadata else None
 
-    @cached_property
-    def _content(self) -> str:
+    def _hash(self, *, is_foreign: bool) -> str:
+        """A hash over the blocks, all or those with messages that are no results: an append leaves these alone."""
+        results = {key for key, connection in self._connections.items() if STAGE in connection.metadata}
         digest = hashlib.sha256()
         for block in self._index.blocks:
+            if is_foreign and block.channel_ids is not None and block.channel_ids <= results:
+                continue
             self._stream.seek(block.offset)
             if block.is_chunk:  # times, size and CRC stand for the content, which need not be read
                 digest.update(self._stream.read(RECORD.size + CHUNK.size)[RECORD.size :])
@@ -133,9 +141,42 @@ class Recording:
         Holds only the chunks in memory that overlap in time. `progress` is told the bytes of each chunk that was read.
         """
         wanted, first, last = self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns
-        for message in self._merge(self._blocks(wanted, first, last), wanted, progress):
-            if first <= message.log_time_ns < last:
-                yield message
+        yield from _within(self._merge(self._blocks(wanted, first, last), wanted, progress), first, last)
+
+    def pieces(
+        self,
+        connections: Collection[Connection],
+        kept: Collection[Connection],
+        declared: Declared,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+        progress: Progress | None = None,
+    ) -> Iterator[RawMessage | WholeChunk]:
+        """What `messages` gives, for a copy: whole chunks come as they are, in place of their messages, where they may.
+
+        `kept` are the connections that are declared in the copy with the ids that they have here.
+        """
+        wanted, first, last = self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns
+        ids = frozenset(self._wanted(kept)) & wanted.keys()
+        active: _Open = []
+        for number, block in enumerate(self._blocks(wanted, first, last)):
+            yield from _within(_drain(active, block.start_ns), first, last)
+            chunk = None
+            if first <= block.start_ns and block.end_ns < last:
+                chunk = read_whole(self._stream, block, ids, declared, verify=self._verify)
+            if chunk is not None:
+                yield from _within(_drain(active, block.start_ns + 1), first, last)
+                if progress:
+                    progress(block.length)
+                yield chunk
+            elif messages := self._load(block, wanted, progress):
+                heapq.heappush(active, (messages[0].log_time_ns, number, 0, messages))
+        yield from _within(_drain(active, 2**64), first, last)
+
+    def ids(self, connection: Connection) -> tuple[int, int]:
+        """The ids of a connection's channel and schema."""
+        channel_id = next(key for key, other in self._connections.items() if other is connection)
+        return channel_id, self._index.channels[channel_id].schema_id
 
     def size_bytes(
         self,
@@ -177,7 +218,7 @@ class Recording:
         self, blocks: list[Block], wanted: dict[int, Connection], progress: Progress | None
     ) -> Iterator[RawMessage]:
         """Messages of blocks that are sorted by their start, which may overlap."""
-        active: list[tuple[int, int, int, list[RawMessage]]] = []  # time of the next message, block, position, messages
+        active: _Open = []
         for number, block in enumerate(blocks):
             yield from _drain(active, block.start_ns)
             messages = self._load(block, wanted, progress)
@@ -186,7 +227,13 @@ class Recording:
         yield from _drain(active, 2**64)
 
 
-def _drain(active: list[tuple[int, int, int, list[RawMessage]]], until_ns: int) -> Iterator[RawMessage]:
+def _within(messages: Iterable[RawMessage], first_ns: int, last_ns: int) -> Iterator[RawMessage]:
+    for message in messages:
+        if first_ns <= message.log_time_ns < last_ns:
+            yield message
+
+
+def _drain(active: _Open, until_ns: int) -> Iterator[RawMessage]:
     """Messages before `until_ns`, in order, from the heap of open blocks; of equal times the earlier block's first."""
     while active and active[0][0] < until_ns:
         _, number, position, messages = heapq.heappop(active)

@@ -14,13 +14,14 @@ from zstandard import ZstdCompressor
 
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.channels import MAP, MAP_MARKERS, MAP_PATH, TF_STATIC, TRUTH_OBJECTS
-from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import CONTENT, RUN, STAGE, entry_text
 from mcap_landmarks.messages.codec import Message, encode
 from mcap_landmarks.messages.qos import KEY, qos_profile
 from mcap_landmarks.messages.typestore import definition
-from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, Opcode, serialize
+from mcap_landmarks.recording.chunk_copy import WholeChunk, compressed
+from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, serialize
+from mcap_landmarks.recording.declared_channels import Declared
 from mcap_landmarks.recording.summary import summary_section
 from mcap_landmarks.stage import Channel, Connection, RawMessage, Stamped
 
@@ -76,8 +77,7 @@ class RecordingWriter:
         self._offset = self._crc = 0
         self._connections: dict[Connection, tuple[int, str]] = {}
         self._own: dict[tuple[str, str], Connection] = {}
-        self._schemas: dict[tuple[str, str, bytes], records.Schema] = {}
-        self._channels: list[records.Channel] = []
+        self._declared = Declared()
         self._message_counts: dict[int, int] = {}
         self._chunks: dict[str, _Chunk] = {}
         self._chunk_indexes: list[records.ChunkIndex] = []
@@ -89,32 +89,24 @@ class RecordingWriter:
 
     def declare(self, connection: Connection) -> None:
         """Give a connection its channel, also if no message of it comes."""
-        if connection in self._connections:
-            return
-        schema_id = 0
-        if connection.message_type:
-            key = (connection.message_type, connection.schema_encoding, connection.schema)
-            if key not in self._schemas:
-                schema = records.Schema(len(self._schemas) + 1, key[2], key[1], key[0])
-                self._schemas[key] = schema
-                self._put(serialize(schema))
-            schema_id = self._schemas[key].id
-        channel = records.Channel(
-            id=len(self._channels) + 1,
-            topic=connection.topic,
-            message_encoding=connection.message_encoding,
-            metadata=dict(connection.metadata),
-            schema_id=schema_id,
-        )
-        if channel.id > 0xFFFF:
-            raise RecordingError(f"{connection.topic} is channel {channel.id}; MCAP holds 65535: choose topics")
-        self._put(serialize(channel))
-        self._channels.append(channel)
-        self._message_counts[channel.id] = 0
+        if connection not in self._connections:
+            self._start(connection, self._declared.declare(connection))
+
+    def keep(self, connection: Connection, channel_id: int, schema_id: int) -> bool:
+        """Declare a connection under the ids that it has in another recording; False if other channels have them."""
+        data = self._declared.keep(connection, channel_id, schema_id) if connection not in self._connections else None
+        if data is not None:
+            self._start(connection, data)
+        return data is not None
+
+    def _start(self, connection: Connection, data: bytes) -> None:
+        self._put(data)
+        channel_id = self._declared.ids[connection]
+        self._message_counts[channel_id] = 0
         self.counts.setdefault(connection.topic, 0)
         own = connection.metadata.get(STAGE, "")
-        group = f"image {channel.id}" if connection.message_type in _IMAGE_TYPES else own
-        self._connections[connection] = (channel.id, group)
+        group = f"image {channel_id}" if connection.message_type in _IMAGE_TYPES else own
+        self._connections[connection] = (channel_id, group)
 
     def write(self, raw: RawMessage) -> None:
         """Write a message as it is, on the channel of its connection."""
@@ -192,8 +184,8 @@ class RecordingWriter:
         ends = [index.message_end_time for index in self._chunk_indexes]
         statistics = records.Statistics(
             message_count=sum(self._message_counts.values()),
-            schema_count=len(self._schemas),
-            channel_count=len(self._channels),
+            schema_count=len(self._declared.schemas),
+            channel_count=len(self._declared.channels),
             attachment_count=len(self._attachments),
             metadata_count=len(metadata_indexes),
             chunk_count=len(self._chunk_indexes),
@@ -202,14 +194,31 @@ class RecordingWriter:
             channel_message_counts={key: count for key, count in self._message_counts.items() if count},
         )
         groups: list[list[records.McapRecord]] = [
-            list(self._schemas.values()),
-            list(self._channels),
+            list(self._declared.schemas.values()),
+            list(self._declared.channels.values()),
             [statistics],
             list(self._chunk_indexes),
             list(self._attachments),
             list(metadata_indexes),
         ]
         self._stream.write(summary_section(groups, self._offset))
+
+    def copy(self, chunk: WholeChunk) -> None:
+        """Write a chunk of another recording as it is; its channels have the ids that they have there.
+
+        What was written to the same channels before lies before it in the file.
+        """
+        for name, other in list(self._chunks.items()):
+            if other.index.keys() & chunk.counts.keys() or chunk.log_time_ns - other.start_ns >= CHUNK_NS:
+                self._flush(self._chunks.pop(name))
+        for channel_id, count in chunk.counts.items():
+            self._message_counts[channel_id] += count
+            self.counts[self._declared.channels[channel_id].topic] += count
+        self._put_chunk(chunk.record, chunk.indexes)
+
+    def declared(self) -> Declared:
+        """The channels and schemas so far."""
+        return self._declared
 
     def _flush(self, chunk: _Chunk) -> None:
         content = self._compress(bytes(chunk.data)) if chunk.compressed else bytes(chunk.data)
@@ -221,27 +230,33 @@ class RecordingWriter:
             uncompressed_crc=zlib.crc32(chunk.data),
             uncompressed_size=len(chunk.data),
         )
-        start = self._offset
-        self._content.update(
-            CHUNK.pack(chunk.start_ns, chunk.end_ns, record.uncompressed_size, record.uncompressed_crc)
-        )
-        self._put(serialize(record))
-        length, offsets = self._offset - start, {}
+        indexes = {}
         for channel_id, entries in sorted(chunk.index.items()):
-            offsets[channel_id] = self._offset
             pairs = list(zip(entries[::2], entries[1::2], strict=True))
-            self._put(serialize(records.MessageIndex(channel_id=channel_id, records=pairs)))
+            indexes[channel_id] = serialize(records.MessageIndex(channel_id=channel_id, records=pairs))
+        self._put_chunk(serialize(record), indexes)
+
+    def _put_chunk(self, record: bytes, indexes: Mapping[int, bytes]) -> None:
+        """Write the whole record of a chunk and those of its message indexes, by channel."""
+        start_ns, end_ns, size, _ = CHUNK.unpack_from(record, RECORD.size)
+        compression, data = compressed(record)
+        start, offsets = self._offset, {}
+        self._content.update(record[RECORD.size : RECORD.size + CHUNK.size])
+        self._put(record)
+        for channel_id, index in indexes.items():
+            offsets[channel_id] = self._offset
+            self._put(index)
         self._chunk_indexes.append(
             records.ChunkIndex(
-                chunk_length=length,
+                chunk_length=len(record),
                 chunk_start_offset=start,
-                compression=record.compression,
-                compressed_size=len(content),
-                message_end_time=chunk.end_ns,
-                message_index_length=self._offset - start - length,
+                compression=compression,
+                compressed_size=len(data),
+                message_end_time=end_ns,
+                message_index_length=self._offset - start - len(record),
                 message_index_offsets=offsets,
-                message_start_time=chunk.start_ns,
-                uncompressed_size=len(chunk.data),
+                message_start_time=start_ns,
+                uncompressed_size=size,
             )
         )
 

@@ -20,6 +20,7 @@ from mcap_landmarks.manifest import (
     told_losses,
 )
 from mcap_landmarks.progress import Watch
+from mcap_landmarks.recording.chunk_copy import WholeChunk
 from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.layered_log import Layer, LayeredLog, own_layer
 from mcap_landmarks.recording.reader import Recording
@@ -74,9 +75,14 @@ def _write(
     counts = dict(Counter(raw.connection.topic for raw in carried))
     size = view.size_bytes(None, span.start_ns, span.end_ns)
     with create_recording(output, metadata) as writer, watch(f"write {output.name}", size) as progress:
-        clean = _declare(writer, layers[0])
-        for raw in chain(carried, view.messages(None, span.start_ns, span.end_ns, progress)):
-            writer.write(raw._replace(connection=clean[raw.connection]) if raw.connection in clean else raw)
+        clean, kept = _declare(writer, layers[0])
+        pieces = view.pieces(kept, writer.declared(), span.start_ns, span.end_ns, progress)
+        for piece in chain(carried, pieces):
+            if isinstance(piece, WholeChunk):
+                writer.copy(piece)
+            else:
+                connection = clean.get(piece.connection)
+                writer.write(piece if connection is None else piece._replace(connection=connection))
         for attachment in () if session.request.results_only else source.attachments():
             writer.attach(attachment)
         told = {LOSSES: source.losses, CARRIED: counts}
@@ -95,16 +101,23 @@ def _own(session: Session, results: Sequence[Layer]) -> Layer:
     return replace(own, channels=()) if session.request.results_only else own
 
 
-def _declare(writer: RecordingWriter, own: Layer) -> dict[Connection, Connection]:
-    """Declare a log's own channels; those that look like results, in a file that was edited, lose that look."""
-    clean = {}
+def _declare(writer: RecordingWriter, own: Layer) -> tuple[dict[Connection, Connection], list[Connection]]:
+    """Declare a log's own channels with the ids that they have there; the changed ones, and those that have their ids.
+
+    Those that look like results, in a file that was edited, lose that look. Results come after them, in chunks of their
+    own, whether they are new or lay in the log: the same results give the same bytes.
+    """
+    clean, kept = {}, []
     for entry in own.channels:
         connection = entry.connection
         if STAGE in connection.metadata:
             metadata = {name: text for name, text in connection.metadata.items() if name != STAGE}
             clean[connection] = replace(connection, metadata=metadata)
-        writer.declare(clean.get(connection, connection))
-    return clean
+        if writer.keep(clean.get(connection, connection), *own.recording.ids(connection)):
+            kept.append(connection)
+        else:
+            writer.declare(clean.get(connection, connection))
+    return clean, kept
 
 
 def _is_there(
