@@ -119,7 +119,9 @@ def block_messages(
     raw = stream.read(block.length)
     if len(raw) < block.length:
         raise DamagedBlockError("the file ends within it")
-    if block.is_chunk:
+    if block.head:
+        content = chunk_content(block.head + raw, verify=verify)
+    elif block.is_chunk:
         if raw[0] != Opcode.CHUNK:
             raise DamagedBlockError("there is no chunk where the summary says")
         record = raw[RECORD.size :]

@@ -49,7 +49,7 @@ def read_whole(
     Its CRC and its message indexes must be right, and every schema and channel in it be what is declared: otherwise its
     messages have to be written anew.
     """
-    if not block.is_chunk or block.is_cut or not (block.channel_ids is None or block.channel_ids <= ids):
+    if not block.is_chunk or block.is_cut or block.head or not (block.channel_ids is None or block.channel_ids <= ids):
         return None
     stream.seek(block.offset)
     record = stream.read(block.length)

@@ -4,78 +4,68 @@ import contextlib
 import hashlib
 import heapq
 from collections.abc import Collection, Iterable, Iterator
+from contextvars import ContextVar
 from functools import cached_property
-from struct import error as struct_error
 from typing import BinaryIO
 
 from mcap import records
 from mcap.exceptions import McapError
 
-from mcap_landmarks.errors import RecordingError
-from mcap_landmarks.locations import Location, to_read
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, STAGE, carried_fingerprint
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.blocks import DamagedBlockError, block_messages
 from mcap_landmarks.recording.chunk_copy import WholeChunk, read_whole
-from mcap_landmarks.recording.container import CHUNK, MAGIC, RECORD, Opcode, parse
+from mcap_landmarks.recording.container import CHUNK, RECORD, parse
+from mcap_landmarks.recording.damage import SuspectChunk
 from mcap_landmarks.recording.declared_channels import Declared
-from mcap_landmarks.recording.rebuild_index import index_by_scanning
-from mcap_landmarks.recording.summary_index import Block, Index, index_from_summary, read_record
+from mcap_landmarks.recording.opening import index_of, open_stream
+from mcap_landmarks.recording.record_shapes import check_attachment
+from mcap_landmarks.recording.summary_index import Block, Index, indexed_messages, read_record
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
-from mcap_landmarks.wording import counted
+
+_from_front: ContextVar[bool] = ContextVar("from_front", default=False)
 
 _Open = list[tuple[int, int, int, list[RawMessage]]]
 """Blocks that are open: the time of the next message, the number of the block, that of the message, all messages."""
 
 
 @contextlib.contextmanager
-def open_recording(path: Location, *, verify: bool = True) -> Iterator["Recording"]:
+def reading_from_front() -> Iterator[None]:
+    """Open every recording in this block as `--lenient` says: by reading it from the front, whatever its summary says.
+
+    A context variable, as what verbs do with logs is no matter of how these are read; threads begin without it.
+    """
+    token = _from_front.set(True)
+    try:
+        yield
+    finally:
+        _from_front.reset(token)
+
+
+@contextlib.contextmanager
+def open_recording(
+    path: Location, *, verify: bool = True, known: Index | None = None, from_front: bool = False
+) -> Iterator["Recording"]:
     """An open recording; `verify` checks the CRC of every chunk that is read.
+
+    `known` is its index from the last time that it was open. With `from_front` all of it is read to find out what it
+    holds; else its summary is taken at its word, where the records agree with that.
 
     Raises:
         RecordingError: there is no such file, or it is not an MCAP file.
     """
-    with _open(path) as stream:
-        yield Recording(path, stream, _index(path, stream), verify=verify)
-
-
-def _open(path: Location) -> BinaryIO:
-    try:
-        return to_read(path).open("rb")
-    except FileNotFoundError as error:
-        raise RecordingError(f"{path}: there is no such file; check the path") from error
-    except IsADirectoryError as error:
-        raise RecordingError(
-            f"{path} is a folder; convert it first: mcap-landmarks convert {path} -o LOG.mcap"
-        ) from error
-    except PermissionError as error:
-        raise RecordingError(f"{path} may not be read; change its permissions") from error
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read ({error.strerror}); check the path") from error
-
-
-def _index(path: Location, stream: BinaryIO) -> Index:
-    size = stream.seek(0, 2)
-    stream.seek(0)
-    if size == 0:
-        raise RecordingError(f"{path} is empty (0 bytes); record or copy it again")
-    if stream.read(len(MAGIC)) != MAGIC:
-        raise RecordingError(f"{path} is not an MCAP file; mcap-landmarks convert reads bags and data sets")
-    try:
-        opcode, content = read_record(stream, len(MAGIC))
-        if opcode != Opcode.HEADER:
-            raise RecordingError(f"{path} does not begin with an MCAP header; copy it again")
-        header = parse(records.Header, content)
-    except (EOFError, McapError, struct_error, ValueError, MemoryError, OverflowError) as error:
-        raise RecordingError(f"{path} ends within its MCAP header; copy it again") from error
-    return index_from_summary(stream, size, header) or index_by_scanning(stream, size, header)
+    with open_stream(path) as stream:
+        index = known or index_of(path, stream, from_front=from_front or _from_front.get())
+        yield Recording(path, stream, index, verify=verify)
 
 
 class Recording:
     """An open recording; made by `open_recording`.
 
     `channels` lists every channel with its count, `start_ns` and `end_ns` are the first and last log time, `metadata`
-    holds the entries of every metadata record by name. `losses` says in words what could not be read, so far.
+    holds the entries of every metadata record by name. `damage` is the account of what could not be read, so far, and
+    `index` where everything lies.
     """
 
     def __init__(self, path: Location, stream: BinaryIO, index: Index, *, verify: bool) -> None:
@@ -83,15 +73,23 @@ class Recording:
         self.profile, self.library = index.header.profile, index.header.library
         self.start_ns, self.end_ns = index.start_ns, index.end_ns
         self.metadata = index.metadata
-        self.losses = list(index.losses)
-        self._stream, self._index, self._verify = stream, index, verify
+        self.index, self.damage = index, index.damage
+        self._stream, self._verify = stream, verify
+        self._lost_attachments: list[str] = []
         self._connections = {key: _connection(index, channel) for key, channel in sorted(index.channels.items())}
         self.channels = tuple(
             ChannelSummary(connection, index.counts.get(key, 0)) for key, connection in self._connections.items()
         )
-        orphans = sum(count for key, count in index.counts.items() if key not in self._connections)
-        if orphans:
-            self.losses.append(f"{counted(orphans, 'message')} of channels that are nowhere described left out")
+
+    @property
+    def losses(self) -> list[str]:
+        """What could not be read so far, in words."""
+        return [*self.damage.losses, *self._lost_attachments]
+
+    @property
+    def notes(self) -> list[str]:
+        """What is odd about the file and costs nothing, in words."""
+        return self.damage.notes
 
     def connections(self, topic: str) -> tuple[Connection, ...]:
         """The connections of a topic, most often one."""
@@ -114,20 +112,30 @@ class Recording:
         """A hash over the blocks, all or those with messages that are no results: an append leaves these alone."""
         results = {key for key, connection in self._connections.items() if STAGE in connection.metadata}
         digest = hashlib.sha256()
-        for block in self._index.blocks:
+        for block in self.index.blocks:
             if is_foreign and block.channel_ids is not None and block.channel_ids <= results:
                 continue
             self._stream.seek(block.offset)
-            if block.is_chunk:  # times, size and CRC stand for the content, which need not be read
+            if block.head:
+                digest.update(block.head[: CHUNK.size])
+            elif block.is_chunk:  # times, size and CRC stand for the content, which need not be read
                 digest.update(self._stream.read(RECORD.size + CHUNK.size)[RECORD.size :])
             else:
                 digest.update(self._stream.read(block.length))
         return digest.hexdigest()
 
     def attachments(self) -> Iterator[records.Attachment]:
-        """The attachments, whole, in the order of the file."""
-        for offset in self._index.attachments:
-            yield parse(records.Attachment, read_record(self._stream, offset)[1])
+        """The attachments, whole, in the order of the file; those that are damaged are told in `losses`."""
+        for offset in self.index.attachments:
+            try:
+                _, content = read_record(self._stream, offset)
+                check_attachment(content)
+                attachment = parse(records.Attachment, content)
+            except (EOFError, McapError, ValueError):
+                loss = f"the attachment at byte {offset} is damaged (its CRC does not match)"
+                self._lost_attachments += [loss] if loss not in self._lost_attachments else []
+            else:
+                yield attachment
 
     def messages(
         self,
@@ -176,7 +184,7 @@ class Recording:
     def ids(self, connection: Connection) -> tuple[int, int]:
         """The ids of a connection's channel and schema."""
         channel_id = next(key for key, other in self._connections.items() if other is connection)
-        return channel_id, self._index.channels[channel_id].schema_id
+        return channel_id, self.index.channels[channel_id].schema_id
 
     def size_bytes(
         self,
@@ -195,7 +203,7 @@ class Recording:
         """The blocks that may hold wanted messages of those times, by their start."""
         blocks = [
             block
-            for block in self._index.blocks
+            for block in self.index.blocks
             if block.end_ns >= first_ns
             and block.start_ns < last_ns
             and (block.channel_ids is None or not block.channel_ids.isdisjoint(wanted))
@@ -206,9 +214,9 @@ class Recording:
         try:
             found = block_messages(self._stream, block, wanted, verify=self._verify)
         except DamagedBlockError as error:
-            loss = f"the chunk at byte {block.offset} is damaged ({error}); its messages are left out"
-            if loss not in self.losses:
-                self.losses.append(loss)
+            self.damage = self.damage.with_suspect(
+                SuspectChunk(block.offset, indexed_messages(self._stream, block), str(error))
+            )
             found = []
         if progress:
             progress(block.length)

@@ -1,125 +1,173 @@
-"""Index a recording that has no usable summary, by reading it once from the front in bounded memory."""
+"""Index a recording by reading it once from the front, in bounded memory: for want of a summary that can be trusted."""
 
-from collections import Counter
+import zlib
+from collections.abc import Callable
 from typing import BinaryIO
 
 from mcap import records
 from mcap.exceptions import McapError
 
-from mcap_landmarks.recording.blocks import DamagedBlockError, chunk_content, cut_chunk_content, records_in
-from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, parse
-from mcap_landmarks.recording.summary_index import Block, Index
+from mcap_landmarks.recording.container import LARGEST_CHUNK, MAGIC, MESSAGE_FIXED, RECORD, Opcode, parse
+from mcap_landmarks.recording.findings import Findings
+from mcap_landmarks.recording.loose_messages import LooseMessages
+from mcap_landmarks.recording.record_shapes import fields_end, fits, head_at
+from mcap_landmarks.recording.resync import Resync, reader_of
+from mcap_landmarks.recording.scanned_chunks import ScannedChunks
+from mcap_landmarks.recording.summary_index import Index, read_summary
 
-RUN_BYTES = 1 << 20
-"""A run of messages outside chunks ends here, as our chunks do: each becomes one block, which is read whole."""
-
-
-class _Run:
-    """Messages outside chunks that follow each other, as one block."""
-
-    def __init__(self, offset: int) -> None:
-        self.offset = self.end = offset
-        self.start_ns, self.end_ns = 2**64 - 1, 0
-
-    def block(self) -> Block:
-        return Block(self.offset, self.end - self.offset, self.start_ns, self.end_ns, is_chunk=False)
+_PIECE = 1 << 20
 
 
-def index_by_scanning(stream: BinaryIO, size: int, header: records.Header) -> Index:
-    """Everything up to the footer, or up to where the file is cut; `losses` says so then."""
-    scanner = _Scanner(stream, size, header)
+def index_by_scanning(stream: BinaryIO, size: int, header: records.Header, remark: str = "") -> Index:
+    """Everything that is sound, from the front to the footer: behind what is damaged it goes on at the next record.
+
+    `remark` says why the summary was not used. The `damage` of the index is the account of it all.
+    """
+    scanner = _Scanner(stream, size, header, remark)
     scanner.run()
     return scanner.index
 
 
 class _Scanner:
-    def __init__(self, stream: BinaryIO, size: int, header: records.Header) -> None:
+    def __init__(self, stream: BinaryIO, size: int, header: records.Header, remark: str) -> None:
         self.index = Index(header)
-        self._stream, self._size = stream, size
-        self._counts: Counter[int] = Counter()
-        self._run: _Run | None = None
+        self._found = found = Findings(self.index, size, remark)
+        self._read, self._size = reader_of(stream), size
+        self._resync = Resync(stream, size, lambda: found.channels)
+        self._chunks = ScannedChunks(self._read, size, found)
+        self._loose = LooseMessages(found)
+        self._summary_rank = 1
+        self._stream = stream
+        self._handlers: dict[int, Callable[[int, int], None]] = {
+            Opcode.SCHEMA: lambda offset, length: self._define(Opcode.SCHEMA, offset, length),
+            Opcode.CHANNEL: lambda offset, length: self._define(Opcode.CHANNEL, offset, length),
+            Opcode.CHUNK: self._chunks.take,
+            Opcode.MESSAGE_INDEX: self._chunks.take_message_index,
+            Opcode.METADATA: self._metadata,
+            Opcode.ATTACHMENT: self._attachment,
+            Opcode.STATISTICS: self._statistics,
+            Opcode.DATA_END: self._data_end,
+            Opcode.FOOTER: self._footer,
+        }
 
     def run(self) -> None:
-        offset, finished = len(MAGIC), False
-        while not finished and offset < self._size:
-            self._stream.seek(offset)
-            head = self._stream.read(RECORD.size)
-            length = RECORD.unpack(head)[1] if len(head) == RECORD.size else self._size
-            if offset + RECORD.size + length > self._size:
-                if head[:1] == bytes([Opcode.CHUNK]):
-                    self._chunk(offset, self._stream.read(self._size - offset - RECORD.size), is_cut=True)
-                break
-            self._take(head[0], offset, length)
-            finished = head[0] == Opcode.FOOTER
-            offset += RECORD.size + length
-        self._close_run()
-        if not finished:
-            self.index.losses.append(f"the file is cut at byte {offset} of {self._size}; what follows is left out")
-        self.index.counts = dict(self._counts)
-        self.index.start_ns = min((block.start_ns for block in self.index.blocks), default=None)
-        self.index.end_ns = max((block.end_ns for block in self.index.blocks), default=None)
+        offset = len(MAGIC)
+        while offset < self._size and not self._found.is_finished:
+            opcode, length = head_at(self._read, offset)
+            if self._is_plausible(opcode, length, offset):
+                self._take(opcode, offset, length)
+                offset += RECORD.size + length
+            else:
+                offset = self._damaged(opcode, offset, length)
+        self._loose.close()
+        if self._found.is_finished and offset + len(MAGIC) < self._size:
+            self._found.remarks.append(f"{self._size - offset - len(MAGIC)} bytes behind its end are no part of it")
+        self._check_data()
+        self.index.damage = self._found.account()
+
+    def _is_plausible(self, opcode: int, length: int, offset: int) -> bool:
+        end = offset + RECORD.size + length
+        if end > self._size or (opcode == Opcode.CHUNK and length > LARGEST_CHUNK):
+            return False
+        if opcode >= 0x80:  # private records, which readers pass over
+            return end == self._size or self._resync.is_record(end)
+        return fits(opcode, length, self._read, offset + RECORD.size)
 
     def _take(self, opcode: int, offset: int, length: int) -> None:
+        if opcode != Opcode.MESSAGE_INDEX:
+            self._chunks.close()
         if opcode == Opcode.MESSAGE:
-            self._message(offset, length)
+            self._loose.take(offset, length, self._read(offset + RECORD.size, MESSAGE_FIXED))
             return
-        self._close_run()
-        if opcode == Opcode.CHUNK:
-            self._chunk(offset, self._stream.read(length))
-        elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
-            self._define(opcode, self._stream.read(length))
-        elif opcode == Opcode.METADATA:
-            record = parse(records.Metadata, self._stream.read(length))
+        self._loose.close()
+        if opcode >= 0x80 and self._chunks.mend(offset, length) is not None:
+            return
+        handler = self._handlers.get(opcode)
+        if handler:
+            handler(offset, length)
+
+    def _damaged(self, opcode: int, offset: int, length: int) -> int:
+        """Deal with what is no sound record; where to go on."""
+        is_cut = not self._found.ends_with_magic(self._read)
+        end = self._chunks.mend(offset, length)
+        if end is None and opcode == Opcode.CHUNK and is_cut:
+            end = self._chunks.take_cut(offset, length)
+        if end is not None:
+            self._loose.close()
+            return end
+        begin, found = self._next_record(offset)
+        self._loose.close()
+        self._chunks.close()
+        if found is None and is_cut and self._could_be_cut(opcode, offset, length):
+            self._found.cut_at(offset)
+        else:
+            self._found.passed_over(begin, found or self._size, opcode, length)
+        return found or self._size
+
+    def _next_record(self, offset: int) -> tuple[int, int | None]:
+        """Where the damage at an offset begins, and the next record behind that.
+
+        One may lie within the loose message before: then the length of that was damaged.
+        """
+        last = self._loose.last_offset
+        found = self._resync.next((offset if last is None else last) + 1)
+        if last is None or found is None or found > offset:
+            return offset, found
+        self._loose.drop_last()
+        return last, found
+
+    def _could_be_cut(self, opcode: int, offset: int, length: int) -> bool:
+        if self._size - offset < RECORD.size:
+            return True
+        return 0 < opcode <= Opcode.DATA_END and self._size < offset + RECORD.size + length and length <= LARGEST_CHUNK
+
+    def _content(self, offset: int, length: int) -> bytes:
+        return self._read(offset + RECORD.size, length)
+
+    def _define(self, opcode: int, offset: int, length: int) -> None:
+        rank = self._summary_rank if self._found.data_end is not None else 1
+        self._found.define(opcode, self._content(offset, length), rank)
+
+    def _metadata(self, offset: int, length: int) -> None:
+        try:
+            record = parse(records.Metadata, self._content(offset, length))
+        except (McapError, ValueError):
+            self._found.lost_records.append(f"the metadata record at byte {offset} is damaged; it is left out")
+        else:
             self.index.metadata[record.name] = record.metadata
-        elif opcode == Opcode.ATTACHMENT:
+            self._found.metadata_count += 1
+
+    def _attachment(self, offset: int, length: int) -> None:
+        begin = offset + RECORD.size
+        end = begin + (fields_end(Opcode.ATTACHMENT, length, self._read, begin) or length) - 4
+        crc = int.from_bytes(self._read(end, 4), "little")
+        if crc and self._crc(begin, end) != crc:
+            self._found.lost_records.append(f"the attachment at byte {offset} is damaged (its CRC does not match)")
+        else:
             self.index.attachments.append(offset)
 
-    def _message(self, offset: int, length: int) -> None:
-        if length < MESSAGE_FIXED:
-            self.index.losses.append(f"the message at byte {offset} is too short; it is left out")
-            self._close_run()
-            return
-        fixed = self._stream.read(MESSAGE_FIXED)
-        _, _, channel_id, _, log_time, _ = MESSAGE.unpack(bytes(RECORD.size) + fixed)
-        if self._run is None:
-            self._run = _Run(offset)
-        self._run.end = offset + RECORD.size + length
-        self._run.start_ns = min(self._run.start_ns, log_time)
-        self._run.end_ns = max(self._run.end_ns, log_time)
-        self._counts[channel_id] += 1
-        if self._run.end - self._run.offset >= RUN_BYTES:
-            self._close_run()
+    def _crc(self, begin: int, end: int, crc: int = 0) -> int:
+        for start in range(begin, end, _PIECE):
+            crc = zlib.crc32(self._read(start, min(_PIECE, end - start)), crc)
+        return crc
 
-    def _close_run(self) -> None:
-        if self._run is not None:
-            self.index.blocks.append(self._run.block())
-            self._run = None
+    def _statistics(self, offset: int, length: int) -> None:
+        self._found.statistics = parse(records.Statistics, self._content(offset, length))
 
-    def _chunk(self, offset: int, record: bytes, *, is_cut: bool = False) -> None:
-        try:
-            content = cut_chunk_content(record) if is_cut else chunk_content(record, verify=True)
-            found = list(records_in(content))
-        except DamagedBlockError as error:
-            self.index.losses.append(f"the chunk at byte {offset} is damaged ({error}); its messages are left out")
-            return
-        has_messages = False
-        for opcode, start, end in found:
-            if opcode in {Opcode.SCHEMA, Opcode.CHANNEL}:
-                self._define(opcode, content[start:end])
-            elif opcode == Opcode.MESSAGE:
-                self._counts[int.from_bytes(content[start : start + 2], "little")] += 1
-                has_messages = True
-        if has_messages:
-            first, last, _, _ = CHUNK.unpack_from(record)
-            self.index.blocks.append(Block(offset, RECORD.size + len(record), first, last, is_cut=is_cut))
+    def _data_end(self, offset: int, length: int) -> None:
+        self._found.data_end = offset
+        self._found.data_crc = int.from_bytes(self._content(offset, min(length, 4)), "little")
+        summary = read_summary(self._stream, self._size)
+        self._summary_rank = 1
+        if summary.is_damaged:
+            self._summary_rank = 0
+        elif summary.footer is not None and summary.footer.summary_crc:
+            self._summary_rank = 2
 
-    def _define(self, opcode: int, content: bytes | memoryview) -> None:
-        try:
-            if opcode == Opcode.SCHEMA:
-                schema = parse(records.Schema, content)
-                self.index.schemas[schema.id] = schema
-            else:
-                channel = parse(records.Channel, content)
-                self.index.channels[channel.id] = channel
-        except (McapError, ValueError) as error:
-            self.index.losses.append(f"a {'schema' if opcode == Opcode.SCHEMA else 'channel'} is damaged: {error}")
+    def _footer(self, _offset: int, _length: int) -> None:
+        self._found.is_finished = True
+
+    def _check_data(self) -> None:
+        """Hold the CRC over the data section against it, where there is one."""
+        if self._found.data_end is not None and self._found.data_crc:
+            self._found.crc_matches = self._crc(0, self._found.data_end) == self._found.data_crc

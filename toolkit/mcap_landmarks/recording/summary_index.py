@@ -1,22 +1,30 @@
 """What a recording holds and where: taken from its summary, where that can be trusted."""
 
+import contextlib
 import zlib
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field, replace
+from struct import Struct
 from struct import error as struct_error
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from mcap import records
 from mcap.exceptions import McapError
 
 from mcap_landmarks.recording.container import FOOTER_SIZE, MAGIC, RECORD, Opcode, parse
+from mcap_landmarks.recording.damage import Damage
+from mcap_landmarks.recording.index_check import DistrustedIndexError, check_index
+
+MESSAGE_START = Struct("<HIQ")
+"""The first fields of a message: channel, sequence, log time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
     """A stretch of the file with messages: one chunk record, whole or cut by the end of the file, or loose messages.
 
-    `channel_ids` are the channels that it has messages of, None where the summary does not say.
+    `channel_ids` are the channels that it has messages of, None where the summary does not say. `head` stands for the
+    damaged header of a chunk, whose data alone lie at `offset`.
     """
 
     offset: int
@@ -26,11 +34,16 @@ class Block:
     is_chunk: bool = True
     is_cut: bool = False
     channel_ids: frozenset[int] | None = None
+    head: bytes = b""
+
+    def holding(self, channel_ids: Collection[int], start_ns: int, end_ns: int) -> "Block":
+        """The block with what its messages say: their channels, and the first and last log time."""
+        return replace(self, channel_ids=frozenset(channel_ids) or None, start_ns=start_ns, end_ns=end_ns)
 
 
 @dataclass(slots=True)
 class Index:
-    """Contents of a recording. `counts` are messages by channel id; `losses` say what of it cannot be read."""
+    """Contents of a recording. `counts` are messages by channel id; `damage` says what of it cannot be read."""
 
     header: records.Header
     schemas: dict[int, records.Schema] = field(default_factory=dict)
@@ -38,10 +51,11 @@ class Index:
     counts: dict[int, int] = field(default_factory=dict)
     blocks: list[Block] = field(default_factory=list)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    metadata_places: list[int] = field(default_factory=list)
     attachments: list[int] = field(default_factory=list)
     start_ns: int | None = None
     end_ns: int | None = None
-    losses: list[str] = field(default_factory=list)
+    damage: Damage = field(default_factory=Damage)
 
 
 def read_record(stream: BinaryIO, offset: int) -> tuple[int, bytes]:
@@ -61,33 +75,70 @@ def read_record(stream: BinaryIO, offset: int) -> tuple[int, bytes]:
     return opcode, content
 
 
-def index_from_summary(stream: BinaryIO, size: int, header: records.Header) -> Index | None:
-    """The index that the summary gives, None if it is missing, damaged or tells less than the file holds."""
+class Summary(NamedTuple):
+    """The end of a recording: its footer, None where there is none, and the records of its summary, if it has any."""
+
+    footer: records.Footer | None
+    section: bytes = b""
+    is_damaged: bool = False
+
+
+def indexed_messages(stream: BinaryIO, block: Block) -> int | None:
+    """How many messages the message indexes behind a chunk list; None where there are none."""
+    offset, total = block.offset + block.length, 0
+    with contextlib.suppress(EOFError):
+        opcode, content = read_record(stream, offset)
+        while opcode == Opcode.MESSAGE_INDEX:
+            total += (len(content) - 6) // 16
+            offset += RECORD.size + len(content)
+            opcode, content = read_record(stream, offset)
+    return total or None
+
+
+def index_from_summary(stream: BinaryIO, size: int, header: records.Header, data_start: int) -> Index | str:
+    """The index that the summary gives, held against the records from `data_start` on that it names.
+
+    Else why it cannot be used, in words; empty where there is none.
+    """
     try:
-        footer, section = _summary(stream, size)
-        if footer is None:
-            return None
-        return _complete(_collect(stream, header, section))
+        summary = read_summary(stream, size)
+        if summary.footer is None or (not summary.section and not summary.is_damaged):
+            return ""
+        if summary.is_damaged:
+            return "its summary is damaged; read from the front"
+        index, chunks = _complete(*_collect(stream, header, summary.section))
+        places = {*index.attachments, *index.metadata_places}
+        is_covered = summary.footer.summary_crc != 0
+        unverified = check_index(
+            stream, (data_start, summary.footer.summary_start), chunks, places, is_covered=is_covered
+        )
+    except DistrustedIndexError as error:
+        return f"its summary is not right ({error}); read from the front"
     except (EOFError, McapError, struct_error, UnicodeDecodeError, IndexError, KeyError, MemoryError, OverflowError):
-        return None
+        return "its summary is damaged; read from the front"
+    total = sum(index.counts.values())
+    index.damage = Damage(expected=total, recovered=total, unverified=unverified, is_whole=True)
+    return index
 
 
-def _summary(stream: BinaryIO, size: int) -> tuple[records.Footer | None, bytes]:
+def read_summary(stream: BinaryIO, size: int) -> Summary:
+    """The end of a recording of so many bytes."""
     tail = FOOTER_SIZE + len(MAGIC)
     if size < tail:
-        return None, b""
+        return Summary(None)
     stream.seek(size - tail)
     end = stream.read(tail)
     if end[-len(MAGIC) :] != MAGIC or end[0] != Opcode.FOOTER:
-        return None, b""
+        return Summary(None)
     footer = parse(records.Footer, end[RECORD.size : FOOTER_SIZE])
+    if footer.summary_start == 0:
+        return Summary(footer)
     if not len(MAGIC) < footer.summary_start <= size - tail:
-        return None, b""
+        return Summary(footer, is_damaged=True)
     stream.seek(footer.summary_start)
     section = stream.read(size - tail - footer.summary_start)
-    if footer.summary_crc and zlib.crc32(end[: FOOTER_SIZE - 4], zlib.crc32(section)) != footer.summary_crc:
-        return None, b""
-    return footer, section
+    crc = zlib.crc32(end[: FOOTER_SIZE - 4], zlib.crc32(section))
+    return Summary(footer, section, is_damaged=bool(footer.summary_crc) and crc != footer.summary_crc)
 
 
 def _each(section: bytes) -> Iterator[tuple[int, bytes]]:
@@ -101,8 +152,10 @@ def _each(section: bytes) -> Iterator[tuple[int, bytes]]:
         position += length
 
 
-def _collect(stream: BinaryIO, header: records.Header, section: bytes) -> tuple[Index, records.Statistics | None]:
-    index, statistics = Index(header), None
+def _collect(
+    stream: BinaryIO, header: records.Header, section: bytes
+) -> tuple[Index, list[records.ChunkIndex], records.Statistics | None]:
+    index, chunks, statistics = Index(header), [], None
     for opcode, content in _each(section):
         if opcode == Opcode.SCHEMA:
             schema = parse(records.Schema, content)
@@ -113,33 +166,43 @@ def _collect(stream: BinaryIO, header: records.Header, section: bytes) -> tuple[
         elif opcode == Opcode.STATISTICS:
             statistics = parse(records.Statistics, content)
         elif opcode == Opcode.CHUNK_INDEX:
-            chunk = parse(records.ChunkIndex, content)
-            block = Block(
-                chunk.chunk_start_offset,
-                chunk.chunk_length,
-                chunk.message_start_time,
-                chunk.message_end_time,
-                channel_ids=frozenset(chunk.message_index_offsets) or None,
-            )
-            index.blocks.append(block)
+            chunks.append(parse(records.ChunkIndex, content))
         elif opcode == Opcode.METADATA_INDEX:
             where = parse(records.MetadataIndex, content)
             record = parse(records.Metadata, read_record(stream, where.offset)[1])
             index.metadata[record.name] = record.metadata
+            index.metadata_places.append(where.offset)
         elif opcode == Opcode.ATTACHMENT_INDEX:
             index.attachments.append(parse(records.AttachmentIndex, content).offset)
-    return index, statistics
+    chunks.sort(key=lambda chunk: chunk.chunk_start_offset)
+    index.blocks = [_block(chunk) for chunk in chunks]
+    return index, chunks, statistics
 
 
-def _complete(collected: tuple[Index, records.Statistics | None]) -> Index | None:
-    """The index, if the statistics confirm that the summary repeats and indexes everything."""
-    index, statistics = collected
+def _block(chunk: records.ChunkIndex) -> Block:
+    return Block(
+        chunk.chunk_start_offset,
+        chunk.chunk_length,
+        chunk.message_start_time,
+        chunk.message_end_time,
+        channel_ids=frozenset(chunk.message_index_offsets) or None,
+    )
+
+
+def _complete(
+    index: Index, chunks: list[records.ChunkIndex], statistics: records.Statistics | None
+) -> tuple[Index, list[records.ChunkIndex]]:
+    """The index with the counts of the statistics.
+
+    Raises:
+        DistrustedIndexError: they do not confirm that the summary repeats and indexes everything.
+    """
     if statistics is None or not (_has_all(index, statistics) and _has_all_messages(index, statistics)):
-        return None
+        raise DistrustedIndexError("it does not list everything")
     index.counts = dict(statistics.channel_message_counts)
     if statistics.message_count:
         index.start_ns, index.end_ns = statistics.message_start_time, statistics.message_end_time
-    return index
+    return index, chunks
 
 
 def _has_all(index: Index, statistics: records.Statistics) -> bool:
