@@ -36,6 +36,11 @@ class Connection:
     message_encoding: str = "cdr"
     metadata: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def read_as(self) -> str:
+        """The type that its messages are read as: none where they are not of CDR, however the type is called."""
+        return self.message_type if self.message_encoding == "cdr" else ""
+
 
 @dataclass(frozen=True, slots=True)
 class ChannelSummary:

@@ -100,7 +100,7 @@ def _candidates(recording: Recording) -> dict[str, int]:
     """The topics with poses, the best first, with their ranks: 0 is the best."""
     counts, kinds = Counter[str](), dict[str, str]()
     for entry in recording.channels:
-        if entry.connection.message_type in _TYPES and entry.count:
+        if entry.connection.read_as in _TYPES and entry.count:
             counts[entry.connection.topic] += entry.count
             kinds[entry.connection.topic] = entry.connection.message_type
     ours = list(_OURS)
@@ -127,7 +127,7 @@ def _default(path: Location, ranks: dict[str, int]) -> str:
 
 
 def _read(recording: Recording, topic: str, rows: _Rows, progress: Progress | None) -> None:
-    wanted = [one for one in recording.connections(topic) if one.message_type in _TYPES]
+    wanted = [one for one in recording.connections(topic) if one.read_as in _TYPES]
     for raw in recording.messages(wanted, progress=progress):
         try:
             message = decode(_TYPES[raw.connection.message_type], raw.data)
@@ -146,7 +146,7 @@ def _covariance(message: PoseWithCovarianceStamped | Odometry) -> Array:
 
 def _transforms(recording: Recording, topic: str, child: str | None, progress: Progress | None) -> _Rows:
     """The transforms of a topic between two frames."""
-    wanted = [one for one in recording.connections(topic) if one.message_type == TFMessage.ROS_TYPE]
+    wanted = [one for one in recording.connections(topic) if one.read_as == TFMessage.ROS_TYPE]
     if not wanted:
         known = ", ".join([*_TYPES, TFMessage.ROS_TYPE])
         found = ", ".join(one.message_type for one in recording.connections(topic)) or "not in the log"

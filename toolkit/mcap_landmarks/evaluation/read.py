@@ -144,6 +144,6 @@ def _connections(recording: Recording, channels: tuple[Channel[Message], ...]) -
 
 def _foreign_scenes(recording: Recording) -> dict[Connection, Channel[Message]]:
     """The one topic of scene objects that somebody else wrote, if there is one."""
-    found = [entry.connection for entry in recording.channels if entry.connection.message_type == SceneObjects.ROS_TYPE]
+    found = [entry.connection for entry in recording.channels if entry.connection.read_as == SceneObjects.ROS_TYPE]
     foreign = [connection for connection in found if connection.topic not in NO_SCENES]
     return {foreign[0]: SCENE_OBJECTS} if len(foreign) == 1 else {}

@@ -122,7 +122,7 @@ def _images(recording: Readable, choice: Choice) -> Sequence[Connection]:
         return choose(recording, CAMERA_IMAGE, choice)
     except UsageError:
         every = [entry.connection for entry in recording.channels]
-        return [one for one in every if one.message_type in IMAGES and not one.topic.startswith(RESULTS)]
+        return [one for one in every if one.read_as in IMAGES and not one.topic.startswith(RESULTS)]
 
 
 def _named(connection: Connection, choice: Choice) -> str:

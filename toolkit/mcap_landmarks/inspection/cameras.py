@@ -126,7 +126,7 @@ def _frames(recording: Readable, named: Named, types: Collection[str]) -> dict[s
     """The frames of the first messages of some types, by topic."""
     found = {}
     for topic, connection in named:
-        if connection.message_type in types and not topic.startswith(RESULTS) and topic not in found:
+        if connection.read_as in types and not topic.startswith(RESULTS) and topic not in found:
             first = next(iter(recording.messages([connection])), None)
             found[topic] = "" if first is None else plain(frame_in(first.data))
     return dict(sorted(found.items()))
@@ -174,7 +174,7 @@ def _depth_topics(recording: Readable, named: Named) -> set[str]:
     found = set()
     for topic, connection in named:
         form = ""
-        for raw in recording.messages([connection]) if connection.message_type in IMAGES else ():
+        for raw in recording.messages([connection]) if connection.read_as in IMAGES else ():
             try:
                 message = decode(IMAGES[connection.message_type], raw.data)
             except MessageError:

@@ -1,9 +1,10 @@
-"""Topics whose messages no stage reads as they are: of ROS 1, of other encodings, with types named otherwise."""
+"""Topics whose messages no stage reads as they are: of ROS 1, of other encodings, of types made or named otherwise."""
 
 from collections.abc import Iterator, Sequence
 
 from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.messages.typestore import full_name
+from mcap_landmarks.sources import counterpart
 from mcap_landmarks.stage import ChannelSummary, Connection
 
 _CONVERT = "convert it first: mcap-landmarks convert LOG -o OUT.mcap"
@@ -37,9 +38,12 @@ def unread(connection: Connection) -> tuple[str, str] | None:
     encoding, ros_type = connection.message_encoding, connection.message_type
     if encoding == "ros1":
         return f"its messages ({ros_type}) are of ROS 1", _CONVERT
+    becomes = counterpart(connection)
     if encoding != "cdr":
         what = f"its messages ({ros_type}) are {encoding or 'of no named encoding'}, and only CDR is read"
-        return what, "record or convert the log as ROS 2 messages in CDR"
+        return what, _CONVERT if becomes else "record the log as ROS 2 messages in CDR"
+    if becomes:
+        return f"its messages are of Foxglove's type {ros_type}, in place of {becomes.ros_type}", _CONVERT
     if full_name(ros_type) != ros_type:
         return f"its type is called {ros_type} in place of {full_name(ros_type)}", _CONVERT
     return None

@@ -164,7 +164,8 @@ def _profile(log: OpenLog) -> str:
 def _describe(log: OpenLog, profile: str, parts: Sequence[Log | Recording], losses: Sequence[str]) -> LogInfo:
     counts = _counts(parts)
     seconds = (log.end_ns - log.start_ns) * 1e-9 if log.start_ns is not None and log.end_ns is not None else 0.0
-    roles = _roles([key for key, count in counts.items() if count])
+    read = {(one.connection.topic, one.connection.read_as) for part in parts for one in part.channels if one.count}
+    roles = _roles(sorted(read))
     missing = _missing(roles)
     return LogInfo(
         log.path,

@@ -147,7 +147,7 @@ class GatheredFrames:
 def frames_of(log: Readable, own: Sequence[Edge] = ()) -> LogFrames:
     """The frames of a log, whenever their transforms were logged; `own` are those of a file, which win."""
     found = GatheredFrames()
-    connections = [entry.connection for entry in log.channels if entry.connection.message_type == TFMessage.ROS_TYPE]
+    connections = [entry.connection for entry in log.channels if entry.connection.read_as == TFMessage.ROS_TYPE]
     for connection in sorted(connections, key=lambda one: not is_static(one.topic)):
         raws = log.messages([connection])
         for raw in raws if is_static(connection.topic) else islice(raws, _MOST_TRANSFORMS):

@@ -139,7 +139,7 @@ def survey(log: OpenLog, roles: Mapping[str, Sequence[str]], progress: Progress 
     for raw in merge(pieces):
         sensor = sensors.get(raw.connection.topic)
         try:
-            if raw.connection.message_type == TFMessage.ROS_TYPE:
+            if raw.connection.read_as == TFMessage.ROS_TYPE:
                 _transforms(raw, found, transforms)
             if sensor is not None:
                 _take(raw, sensor, found, strides[sensor.topic])

@@ -121,6 +121,7 @@ def could_be(present: Iterable[tuple[str, str]], channel: Channel[Message]) -> s
 
 _LIKE_SCANS = re.compile("scan|laser|lidar|echo|sonar|range|points|cloud|packets", re.IGNORECASE)
 """What topics and types are called that carry what a LiDAR or the like measures."""
+_FOXGLOVE = ("foxglove.", "foxglove_msgs/")
 _SINGLE_RANGE = "sensor_msgs/msg/Range"
 
 
@@ -133,6 +134,9 @@ def _no_scans(present: Iterable[tuple[str, str]]) -> list[str]:
             continue
         if ros_type == _SINGLE_RANGE:
             said.append(f"{topic} is {ros_type}: single ranges are not used")
+        elif ros_type.startswith(_FOXGLOVE):
+            if ros_type.endswith(("LaserScan", "PointCloud")):
+                said.append(f"{topic} is {ros_type}, which convert makes a message of ROS 2")
         elif _LIKE_SCANS.search(f"{topic} {ros_type.rpartition('/')[2]}"):
             said.append(
                 f"{topic} is {ros_type}, which is read as no scan; have its driver record LaserScan or PointCloud2"
@@ -155,14 +159,14 @@ def choose(recording: Readable, channel: Channel[Message], choice: Choice) -> tu
         return _of_cameras(channel, cameras_of(recording, choice).used, named)
     chosen = _chosen(recording, channel, named, choice)
     found = tuple(connection for topic, connection in named if topic in chosen)
-    if chosen and not any(connection.message_type in role.types for connection in found):
+    if chosen and not any(connection.read_as in role.types for connection in found):
         _check_chosen(recording, role, chosen[0], found)
     return _of_role(role, found)
 
 
 def _of_role(role: Role, connections: Iterable[Connection]) -> tuple[Connection, ...]:
     """The connections that fit a role: two programs may share a topic, with a type each."""
-    return tuple(connection for connection in connections if connection.message_type in role.types)
+    return tuple(connection for connection in connections if connection.read_as in role.types)
 
 
 def _chosen(recording: Readable, channel: Channel[Message], named: Named, choice: Choice) -> list[str]:
@@ -172,7 +176,7 @@ def _chosen(recording: Readable, channel: Channel[Message], named: Named, choice
         return []
     if role.name in choice.topics:
         return [choice.topics[role.name]]
-    fitting = topics_for(role, [(topic, connection.message_type) for topic, connection in named])
+    fitting = topics_for(role, [(topic, connection.read_as) for topic, connection in named])
     return _only(recording, channel, fitting, choice)
 
 
@@ -237,18 +241,23 @@ def _check_chosen(recording: Readable, role: Role, topic: str, found: Collection
             f"{recording.path}: there is no topic {topic} to read as the {role.name}; mcap-landmarks info lists them"
         )
     for connection in found:
-        if connection.message_type not in role.types:
+        if connection.read_as not in role.types:
             raise UsageError(
-                f"{recording.path}: {connection.topic} is {connection.message_type}, but {role.option} needs "
-                f"{' or '.join(role.types)}"
+                f"{recording.path}: {connection.topic} is {connection.message_type}{_encoding(connection)}, but {role.option} "
+                f"needs {' or '.join(role.types)}"
             )
+
+
+def _encoding(connection: Connection) -> str:
+    """The encoding of messages that are not of CDR, in words."""
+    return "" if connection.read_as else f" in {connection.message_encoding or 'an unknown encoding'}"
 
 
 def _images(recording: Readable, choice: Choice) -> list[str]:
     """The topics that could be the image, or the one that was chosen."""
     role, named = ROLES[channels.CAMERA_IMAGE], _named(recording, choice)
     chosen = choice.topics.get(role.name)
-    return [chosen] if chosen else topics_for(role, [(topic, entry.message_type) for topic, entry in named])
+    return [chosen] if chosen else topics_for(role, [(topic, entry.read_as) for topic, entry in named])
 
 
 def _of_the_image(image: str, infos: list[str]) -> list[str]:

@@ -26,17 +26,17 @@ def latched(connections: Iterable[Connection]) -> list[Connection]:
     """
     every = list(connections)
     found = [connection for connection in every if _is_latched(connection)]
-    if not any(connection.message_type == TFMessage.ROS_TYPE for connection in found):
-        found += [connection for connection in every if connection.message_type == TFMessage.ROS_TYPE]
+    if not any(connection.read_as == TFMessage.ROS_TYPE for connection in found):
+        found += [connection for connection in every if connection.read_as == TFMessage.ROS_TYPE]
     return found
 
 
 def _is_latched(connection: Connection) -> bool:
     if connection.message_type in _LOG_TYPES or connection.topic.endswith(_SERVICE_EVENTS):
         return False
-    is_static = connection.topic.endswith(TF_STATIC.topic) and connection.message_type == TFMessage.ROS_TYPE
+    is_static = connection.topic.endswith(TF_STATIC.topic) and connection.read_as == TFMessage.ROS_TYPE
     latched = _TRANSIENT_LOCAL.search(connection.metadata.get(KEY, ""))
-    return is_static or latched is not None or connection.message_type == CameraInfo.ROS_TYPE
+    return is_static or latched is not None or connection.read_as == CameraInfo.ROS_TYPE
 
 
 def latest(raws: Iterable[RawMessage], start_ns: int) -> list[RawMessage]:

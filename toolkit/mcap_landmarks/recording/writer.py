@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import zlib
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
@@ -28,23 +28,39 @@ from mcap_landmarks.stage import Channel, Connection, RawMessage, Stamped
 CHUNK_BYTES = 1 << 20
 CHUNK_NS = 5 * 10**9
 """Where a chunk ends: between 256 KiB and 4 MiB size hardly matters, and those that overlap for longer cost memory."""
+ROS2 = "ros2"
+"""The profile of recordings whose messages are all of CDR, each with its definition."""
 _IMAGE_TYPES = frozenset({"sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"})
 _LATCHED = frozenset(channel.topic for channel in (TF_STATIC, MAP, MAP_MARKERS, MAP_PATH, TRUTH_OBJECTS))
 
 
+def profile_of(connections: Iterable[Connection]) -> str:
+    """The profile of a recording with some connections: ROS 2's if all are of CDR with definitions, else none.
+
+    What ROS 2 reads by that profile is refused whole, by rosbags for one, where a single channel is another.
+    """
+    every = {(one.message_encoding, one.schema_encoding) for one in connections}
+    return ROS2 if every <= {("cdr", "ros2msg"), ("cdr", "ros2idl")} else ""
+
+
 @contextlib.contextmanager
 def create_recording(
-    path: Location, metadata: Mapping[str, Mapping[str, str]] | None = None, *, is_passing: bool = False
+    path: Location,
+    metadata: Mapping[str, Mapping[str, str]] | None = None,
+    *,
+    profile: str = ROS2,
+    is_passing: bool = False,
 ) -> Iterator["RecordingWriter"]:
     """A writer whose file takes the name `path` when the block ends well and vanishes when it does not.
 
-    One that `is_passing`, which is read once and removed, is compressed in a quarter of the time, and less.
+    `profile` is that of the channels, see `profile_of`. One that `is_passing`, which is read once and removed, is
+    compressed in a quarter of the time, and less.
 
     Raises:
         UsageError, RecordingError: the file cannot be written; nothing is left behind.
     """
     with atomic_file(path) as stream:
-        writer = RecordingWriter(stream, is_passing=is_passing)
+        writer = RecordingWriter(stream, profile=profile, is_passing=is_passing)
         for name, entries in (metadata or {}).items():
             writer.metadata[name] = dict(entries)
         yield writer
@@ -70,7 +86,7 @@ class RecordingWriter:
     goes into it, one record per name; a manifest with a fingerprint is bound to the content.
     """
 
-    def __init__(self, stream: BinaryIO, *, is_passing: bool = False) -> None:
+    def __init__(self, stream: BinaryIO, *, profile: str = ROS2, is_passing: bool = False) -> None:
         self.metadata: dict[str, dict[str, str]] = {}
         self.counts: dict[str, int] = {}
         self._stream = stream
@@ -85,7 +101,7 @@ class RecordingWriter:
         self._content = hashlib.sha256()
         self._compression = "lz4" if is_passing else "zstd"
         self._compress = lz4.frame.compress if is_passing else ZstdCompressor(level=3).compress
-        self._put(MAGIC + serialize(records.Header(profile="ros2", library="mcap-landmarks")))
+        self._put(MAGIC + serialize(records.Header(profile=profile, library="mcap-landmarks")))
 
     def declare(self, connection: Connection) -> None:
         """Give a connection its channel, also if no message of it comes."""

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
@@ -16,7 +16,7 @@ from mcap_landmarks.messages.qos import KEY
 from mcap_landmarks.moments import moment
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.latched import carried_note, latched, latest
-from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.recording.writer import ROS2, create_recording, profile_of
 from mcap_landmarks.sources import Piece, merge
 from mcap_landmarks.stage import Connection, RawMessage
 
@@ -89,7 +89,10 @@ class Job:
             done.notes.extend(log.notes)
         counts: Counter[Connection] = Counter()
         carried = self._before_start()
-        with create_recording(self._target, self._metadata(hashes)) as writer:
+        profile = profile_of(self._unified.values())
+        if profile != ROS2:
+            done.notes.append(_told_others(self._unified.values()))
+        with create_recording(self._target, self._metadata(hashes), profile=profile) as writer:
             for connection in self._unified.values():
                 writer.declare(connection)
                 done.topics[connection.topic] += 0
@@ -189,3 +192,10 @@ def _identity(connection: Connection) -> tuple[object, ...]:
     quality = connection.metadata.get(KEY)
     encodings = connection.message_encoding, connection.schema_encoding
     return connection.topic, connection.message_type, encodings, definition, quality
+
+
+def _told_others(connections: Iterable[Connection]) -> str:
+    """That messages which ROS 2 does not read are carried along, of which topics."""
+    others = {one.topic: one.message_encoding or "unknown" for one in connections if profile_of([one]) != ROS2}
+    named = ", ".join(f"{topic} ({encoding})" for topic, encoding in sorted(others.items()))
+    return f"its profile is no longer ros2, since messages are carried as they are: {named}; --topics leaves them out"

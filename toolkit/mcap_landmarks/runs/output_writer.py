@@ -24,7 +24,7 @@ from mcap_landmarks.recording.chunk_copy import WholeChunk
 from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.layered_log import Layer, LayeredLog, own_layer
 from mcap_landmarks.recording.reader import Recording
-from mcap_landmarks.recording.writer import RecordingWriter, create_recording
+from mcap_landmarks.recording.writer import RecordingWriter, create_recording, profile_of
 from mcap_landmarks.runs.session import Session
 from mcap_landmarks.stage import Connection, RawMessage
 
@@ -74,7 +74,8 @@ def _write(
     carried = [] if span.start_ns is None else _before(view, span.start_ns)
     counts = dict(Counter(raw.connection.topic for raw in carried))
     size = view.size_bytes(None, span.start_ns, span.end_ns)
-    with create_recording(output, metadata) as writer, watch(f"write {output.name}", size) as progress:
+    profile = profile_of(entry.connection for entry in view.channels)
+    with create_recording(output, metadata, profile=profile) as writer, watch(f"write {output.name}", size) as progress:
         clean, kept = _declare(writer, layers[0])
         pieces = view.pieces(kept, writer.declared(), span.start_ns, span.end_ns, progress)
         for piece in chain(carried, pieces):

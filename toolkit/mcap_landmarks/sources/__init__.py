@@ -5,6 +5,7 @@ import pkgutil
 from pathlib import Path
 
 from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.sources._foxglove_types import counterpart
 from mcap_landmarks.sources._merge import Piece, merge
 from mcap_landmarks.sources._shape import Carried, Log, McapFile, NoConfig, Source, SourceLog
 
@@ -48,6 +49,7 @@ __all__ = [
     "Piece",
     "Source",
     "SourceLog",
+    "counterpart",
     "find_source",
     "merge",
     "source_names",

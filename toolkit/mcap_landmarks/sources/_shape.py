@@ -49,24 +49,27 @@ class Log(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Carried:
-    """The ROS 2 connection that stands for another one, and what makes its payloads CDR.
+    """The connection that stands for another one, of ROS 2 where there is one, and what makes its payloads from those.
 
-    `convert` raises MessageError for a payload that cannot be understood.
+    `convert` raises MessageError for a payload that cannot be understood. `mount` is there for messages that say
+    themselves where their sensor is: of the first of them, it gives the TFMessage that says so, None where none is
+    needed, and has to be asked before others are converted.
     """
 
     connection: Connection
     convert: Callable[[Payload], Payload]
+    mount: Callable[[Payload], bytes | None] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class McapFile:
     """A part of a log that is an MCAP file, which sources do not open.
 
-    carry: how a connection of the file is carried on, None if it cannot be.
+    carry: how a connection of the file is carried on.
     """
 
     path: Path
-    carry: Callable[[Connection], Carried | None]
+    carry: Callable[[Connection], Carried]
 
 
 @dataclass(frozen=True, slots=True)
