@@ -9,6 +9,9 @@ from tests.cases.steps import check_case
 
 CASES = (
     "bitrot_one_chunk",
+    "foxglove_json",
+    "foxglove_protobuf",
+    "foxglove_protobuf_ros_odom",
     "info_binning",
     "info_half_size",
     "no_odometry",

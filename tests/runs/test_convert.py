@@ -138,9 +138,7 @@ def test_ros1_messages_in_mcap_become_ros2(tmp_path: Path) -> None:
         writer.add_message(channel, START_NS, bytes(ROS1.serialize_ros1(scan(ROS1, START_NS), name)), START_NS)
         writer.add_message(other, START_NS, b"{}", START_NS)
         writer.finish()
-    done = one(source, target)
-    assert done.topics == {"/scan": 1}
-    assert done.dropped == {"/json: json messages, where ROS 2 needs CDR": 1}
+    assert one(source, target, Selection(("/scan",))).topics == {"/scan": 1}
     wanted = bytes(HUMBLE.serialize_cdr(scan(HUMBLE, START_NS), name))
     assert stored(target) == {("/scan", START_NS, wanted): 1}
 

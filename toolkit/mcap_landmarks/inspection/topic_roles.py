@@ -243,8 +243,8 @@ def _check_chosen(recording: Readable, role: Role, topic: str, found: Collection
     for connection in found:
         if connection.read_as not in role.types:
             raise UsageError(
-                f"{recording.path}: {connection.topic} is {connection.message_type}{_encoding(connection)}, but {role.option} "
-                f"needs {' or '.join(role.types)}"
+                f"{recording.path}: {connection.topic} is {connection.message_type}{_encoding(connection)}, but "
+                f"{role.option} needs {' or '.join(role.types)}"
             )
 
 
