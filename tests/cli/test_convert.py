@@ -37,6 +37,7 @@ def test_the_document_fits_its_schema(tmp_path: Path, capsys: pytest.CaptureFixt
         "declared": 80,
         "read": 80,
         "lost": 0,
+        "left_out": [],
         "dropped": {},
         "losses": [],
         "failures": [],
@@ -84,10 +85,12 @@ def test_settings_reach_the_source(tmp_path: Path, capsys: pytest.CaptureFixture
 
 
 def test_a_distribution_may_be_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    source = write_plain_db3(tmp_path / "a.db3")
+    source = write_plain_db3(tmp_path / "a.db3", message_type="shape_msgs/msg/SolidPrimitive")
     assert run(source, "-o", tmp_path / "a.mcap") == UNUSABLE
-    assert "--distro humble" in capsys.readouterr().err
-    assert run(source, "-o", tmp_path / "a.mcap", "--distro", "humble") == DONE
+    assert "such as --distro" in capsys.readouterr().err
+    assert run(source, "-o", tmp_path / "a.mcap", "--distro", "humble") == UNUSABLE
+    assert "are not humble's shape_msgs/msg/SolidPrimitive" in capsys.readouterr().err
+    assert run(write_plain_db3(tmp_path / "b.db3"), "-o", tmp_path / "a.mcap", "--distro", "humble") == DONE
 
 
 def test_losses_end_with_their_own_code(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -150,7 +153,7 @@ def test_an_output_that_exists_is_replaced_whole_or_not_at_all(tmp_path: Path) -
     before = target.read_bytes()
     assert run(tmp_path / "a.bag", "-o", target) == DONE
     assert target.read_bytes() == before
-    other, unknown = write_ros2(tmp_path / "c"), write_plain_db3(tmp_path / "b.db3")
+    other, unknown = write_ros2(tmp_path / "c"), write_plain_db3(tmp_path / "b.db3", message_type="my_msgs/msg/Own")
     assert run(other, "-o", target) == USAGE
     assert run(unknown, "-o", target, "--overwrite") == UNUSABLE
     assert target.read_bytes() == before

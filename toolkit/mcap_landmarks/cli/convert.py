@@ -27,9 +27,11 @@ def command(
     ] = None,
     start: options.Start = None,
     end: options.End = None,
-    distro: Annotated[
-        str | None, typer.Option("--distro", help="ROS 2 distribution of bags without definitions, such as humble.")
-    ] = None,
+    distro: options.Distro = None,
+    definitions: options.Definitions = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Refuse a log with a topic that cannot be understood; it is left out else.")
+    ] = False,
     config_file: options.ConfigFile = None,
     settings: options.Set = None,
     overwrite: options.Overwrite = False,
@@ -45,11 +47,10 @@ def command(
     from mcap_landmarks.runs.convert import convert
 
     chosen = gather(config_file, settings or [], None)
-    if distro:
-        chosen.setdefault("rosbag2", {})["distro"] = distro
+    options.add_definitions(chosen, distro, definitions)
     selection = Selection(tuple(topics or ()), options.time_ns(start, "--start"), options.time_ns(end, "--end"))
     beside = [config_file] if config_file else []
-    conversion = convert(inputs, output, selection, chosen, progress, beside=beside, overwrite=overwrite)
+    conversion = convert(inputs, output, selection, chosen, progress, beside=beside, overwrite=overwrite, strict=strict)
     for done in conversion.outputs:
         _report(done)
     for failure in conversion.failures:
@@ -58,7 +59,7 @@ def command(
         say_json("convert", _document(conversion))
     else:
         _print(conversion)
-    if conversion.failures or any(done.losses or done.lost for done in conversion.outputs):
+    if conversion.failures or any(done.losses or done.lost or done.left_out for done in conversion.outputs):
         raise typer.Exit(PARTIAL)
 
 
@@ -67,6 +68,8 @@ def _report(done: "Converted") -> None:
         warn(f"note: {done.path}: {note}")
     for reason, count in sorted(done.dropped.items()):
         warn(f"note: {done.path}: left out {count}: {reason}")
+    for topic in done.left_out:
+        warn(f"warning: {done.path}: left out {topic.told}")
     for loss in done.losses:
         warn(f"warning: {done.path}: {loss}")
     if done.lost:
@@ -92,6 +95,7 @@ def _document(conversion: "Conversion") -> dict[str, object]:
         "read": sum(done.topics.total() for done in conversion.outputs),
         "lost": sum(done.lost for done in conversion.outputs),
         "dropped": dropped,
+        "left_out": [topic.entries() for done in conversion.outputs for topic in done.left_out],
         "losses": [loss for done in conversion.outputs for loss in done.losses],
         "failures": [str(failure) for failure in conversion.failures],
     }

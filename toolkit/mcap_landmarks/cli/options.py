@@ -2,6 +2,7 @@
 
 import re
 from datetime import datetime
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -36,6 +37,18 @@ TimeOffset = Annotated[
         metavar="ROLE=SECONDS",
         help="Seconds to add to the stamps of a role's messages: odometry, scan, second_scan, image or scene_objects; "
         "repeatable.",
+    ),
+]
+Distro = Annotated[
+    str | None,
+    typer.Option("--distro", help="ROS 2 distribution of bags without definitions, such as humble."),
+]
+Definitions = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--definitions",
+        metavar="DIR|FILE",
+        help=".msg, .srv, .action and .idl of types that bags do not define, as in a package's share/; repeatable.",
     ),
 ]
 OdometryTopic = Annotated[
@@ -135,3 +148,11 @@ def time_ns(text: str | None, option: str) -> int | None:
     whole = moment.replace(microsecond=0)
     fraction = re.search(r"[.,](\d+)", text)  # datetime keeps microseconds only
     return int(whole.timestamp()) * 10**9 + (int(fraction[1].ljust(9, "0")[:9]) if fraction else 0)
+
+
+def add_definitions(settings: dict[str, dict[str, object]], distro: str | None, definitions: list[Path] | None) -> None:
+    """Add to the settings where definitions come from that bags lack."""
+    if distro:
+        settings.setdefault("rosbag2", {})["distro"] = distro
+    if definitions:
+        settings.setdefault("rosbag2", {})["definitions"] = [str(path) for path in definitions]

@@ -11,7 +11,8 @@ from mcap_landmarks.resources import resource
 RosObject = Any
 """A message, or a part of one, of the typestore: its classes are made at run time, so that no checker knows them."""
 
-_OWN_PACKAGES = ("vision_msgs", "foxglove_msgs", "mcap_landmarks_msgs")
+OWN_PACKAGES = ("vision_msgs", "foxglove_msgs", "mcap_landmarks_msgs")
+"""Those whose definitions lie in schemas/."""
 _GROWING = ("mcap_landmarks_msgs",)  # the others are defined elsewhere, and stay as they are
 
 
@@ -19,7 +20,7 @@ _GROWING = ("mcap_landmarks_msgs",)  # the others are defined elsewhere, and sta
 def typestore() -> Typestore:
     """Humble's types and ours; building it takes some 50 ms, so it is built once."""
     store = get_typestore(Stores.ROS2_HUMBLE)
-    for package in _OWN_PACKAGES:
+    for package in OWN_PACKAGES:
         types = {}
         for path in sorted(resource("schemas", package).glob("*.msg")):
             types.update(get_types_from_msg(path.read_text(), f"{package}/msg/{path.stem}"))

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
@@ -11,16 +11,18 @@ from pathlib import Path
 from mcap_landmarks.config import effective
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog
-from mcap_landmarks.manifest import CARRIED, RUN, Manifest, entry_text, is_generated
+from mcap_landmarks.manifest import CARRIED, RUN, Manifest, entry_text, file_hash, is_generated
 from mcap_landmarks.messages.qos import KEY
 from mcap_landmarks.moments import moment
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.latched import carried_note, latched, latest
-from mcap_landmarks.recording.writer import ROS2, create_recording, profile_of
-from mcap_landmarks.sources import Piece, merge
+from mcap_landmarks.recording.writer import ROS2, RecordingWriter, create_recording, profile_of
+from mcap_landmarks.runs.bag_record import bag_record, custom_data_of
+from mcap_landmarks.runs.rosbag2_metadata import RECORD
+from mcap_landmarks.sources import OmittedTopic, Piece, definition_files, merge
 from mcap_landmarks.stage import Connection, RawMessage
 
-_LOST_WITH = frozenset({RUN, "rosbag2"})  # metadata records that would no longer be true
+_LOST_WITH = frozenset({RUN, RECORD})  # metadata records that would no longer be true
 _COMMENT = re.compile(rb"#[^\n]*")
 
 
@@ -40,7 +42,10 @@ class Selection:
 
 @dataclass(slots=True)
 class Converted:
-    """One output: messages by topic, how many the storage declared and how many of these could not be read."""
+    """One output: messages by topic, how many the storage declared and how many of these could not be read.
+
+    Those of topics that are `left_out`, since nobody could understand them, are among the lost ones.
+    """
 
     path: Path
     topics: Counter[str] = field(default_factory=Counter)
@@ -49,20 +54,38 @@ class Converted:
     dropped: Counter[str] = field(default_factory=Counter)
     losses: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    left_out: list[OmittedTopic] = field(default_factory=list)
 
 
 class Job:
     """One output on its way: the logs that are merged into it."""
 
     def __init__(
-        self, target: Path, logs: Sequence[OpenLog], selection: Selection, patterns: Sequence[re.Pattern[str]]
+        self,
+        target: Path,
+        logs: Sequence[OpenLog],
+        selection: Selection,
+        patterns: Sequence[re.Pattern[str]],
+        *,
+        strict: bool = False,
     ) -> None:
+        """Raises RecordingError: no topic can be carried, or with `strict` one cannot."""
         self._target, self._logs, self._selection = target, logs, selection
         self._parts = [part for log in logs for part in log.parts]
         self._declared: Counter[Connection] = Counter()
-        self._unified = self._unify(patterns)
 
-    def _unify(self, patterns: Sequence[re.Pattern[str]]) -> dict[Connection, Connection]:
+        def wanted(topic: str) -> bool:
+            return not patterns or any(pattern.fullmatch(topic) for pattern in patterns)
+
+        for part in self._parts:
+            part.verify(wanted)
+        self._left_out = _together(one for log in logs for one in log.left_out if wanted(one.topic))
+        self._unified = self._unify(wanted)
+        if self._left_out and (strict or not self._unified):
+            reasons = "; ".join(one.told for one in self._left_out)
+            raise RecordingError(f"{self._where()}: {reasons}")
+
+    def _unify(self, wanted: Callable[[str], bool]) -> dict[Connection, Connection]:
         """The connection that stands in the output for each wanted one: equal ones share theirs."""
         unified: dict[Connection, Connection] = {}
         known: dict[tuple[object, ...], Connection] = {}
@@ -70,10 +93,10 @@ class Job:
         for entry in (entry for part in self._parts for entry in part.channels):
             connection = entry.connection
             topics.add(connection.topic)
-            if not patterns or any(pattern.fullmatch(connection.topic) for pattern in patterns):
+            if wanted(connection.topic):
                 unified[connection] = known.setdefault(_identity(connection), connection)
                 self._declared[unified[connection]] += entry.count
-        if topics and not unified:
+        if topics and not unified and not self._left_out:
             raise UsageError(f"{self._logs[0].path}: --topics matches none of {', '.join(sorted(topics))}")
         return unified
 
@@ -83,11 +106,10 @@ class Job:
         Raises:
             RecordingError: no message can be read, or the output cannot be written.
         """
-        done = Converted(self._target)
+        done = Converted(self._target, left_out=self._left_out)
         for log in self._logs:
             done.dropped.update(log.dropped)
             done.notes.extend(log.notes)
-        counts: Counter[Connection] = Counter()
         carried = self._before_start()
         profile = profile_of(self._unified.values())
         if profile != ROS2:
@@ -97,12 +119,8 @@ class Job:
                 writer.declare(connection)
                 done.topics[connection.topic] += 0
             within = self._messages(self._unified, self._selection.start_ns, self._selection.end_ns, advance)
-            for raw in chain(carried, within):
-                writer.write(raw)
-                counts[raw.connection] += 1
-            for part in self._parts:
-                if isinstance(part, McapLog):
-                    part.copy_attachments(writer)
+            counts, span_ns = _write(writer, chain(carried, within))
+            self._carry_over(writer, done, counts, span_ns)
             for connection, count in counts.items():
                 done.topics[connection.topic] += count
             if carried:
@@ -111,6 +129,19 @@ class Job:
                 writer.metadata[RUN][CARRIED] = entry_text(on_topics)
             self._account(done, counts, len(carried))
         return done
+
+    def _carry_over(
+        self, writer: RecordingWriter, done: Converted, counts: Counter[Connection], span_ns: Sequence[int]
+    ) -> None:
+        """Attachments, and what rosbag2 keeps of a bag as a whole where the inputs have that."""
+        told = [one for log in self._logs for one in log.told]
+        done.notes += custom_data_of(told)[1]
+        every = {connection: counts[connection] for connection in self._unified.values()}
+        if record := bag_record(told, every, span_ns):
+            writer.metadata[RECORD] = record
+        for part in self._parts:
+            if isinstance(part, McapLog):
+                part.copy_attachments(writer)
 
     def _messages(
         self,
@@ -148,7 +179,7 @@ class Job:
             if missing:
                 done.dropped["messages outside the time range"] += missing
         else:
-            done.lost = missing
+            done.lost = missing + sum(one.messages for one in self._left_out)
         done.declared = read + done.lost
         if read == carried:
             raise RecordingError(f"{self._where()}: {self._why_nothing(declared, done)}")
@@ -157,18 +188,22 @@ class Job:
         return ", ".join(dict.fromkeys(str(log.path) for log in self._logs))
 
     def _why_nothing(self, declared: int, done: Converted) -> str:
+        if self._left_out and not declared:
+            return "; ".join(one.told for one in self._left_out)
         if done.losses:
             return f"no message can be read: {done.losses[0]}"
         if done.lost:
             return f"none of {done.lost} declared messages can be read; copy it again"
         if declared:
-            starts = [log.start_ns for log in self._logs if log.start_ns is not None]
-            ends = [log.end_ns for log in self._logs if log.end_ns is not None]
-            lasts = f"from {moment(min(starts))} to {moment(max(ends))}" if starts and ends else "no time at all"
-            return f"no message lies in the time range; the log lasts {lasts}"
+            return f"no message lies in the time range; the log lasts {self._lasts()}"
         if done.dropped:
             return "; ".join(f"{reason} ({count})" for reason, count in done.dropped.items())
         return "there are no messages in it; choose another log, or other --topics"
+
+    def _lasts(self) -> str:
+        starts = [log.start_ns for log in self._logs if log.start_ns is not None]
+        ends = [log.end_ns for log in self._logs if log.end_ns is not None]
+        return f"from {moment(min(starts))} to {moment(max(ends))}" if starts and ends else "no time at all"
 
     def _metadata(self, hashes: Mapping[Path, str]) -> Mapping[str, Mapping[str, str]]:
         """The inputs' metadata records, where these stay true, and the manifest."""
@@ -178,12 +213,41 @@ class Job:
                 carried.update({name: entries for name, entries in part.metadata.items() if name not in _LOST_WITH})
         manifest = Manifest(
             verb="convert",
-            config={log.source: effective(log.config) for log in self._logs},
+            config={log.source: _set(log) for log in self._logs},
             inputs=tuple(hashes[log.path] for log in self._logs),
             options=self._selection.options(),
             generated=all(isinstance(part, McapLog) and is_generated(part.metadata) for part in self._parts),
         )
         return {**carried, RUN: manifest.entries()}
+
+
+def _write(writer: RecordingWriter, messages: Iterator[RawMessage]) -> tuple[Counter[Connection], Sequence[int]]:
+    """Write messages: how many of each connection, and the first and last log time if there are any."""
+    counts: Counter[Connection] = Counter()
+    raw = first = next(messages, None)
+    if first is None or raw is None:
+        return counts, ()
+    for raw in chain([first], messages):
+        writer.write(raw)
+        counts[raw.connection] += 1
+    return counts, (first.log_time_ns, raw.log_time_ns)
+
+
+def _set(log: OpenLog) -> dict[str, object]:
+    """What is set of a log's source; of files with definitions what is in them, since no path gets into a manifest."""
+    entries = effective(log.config)
+    given = entries.pop("definitions", ())
+    paths = [Path(path) for path in given if isinstance(path, str)] if isinstance(given, tuple) else []
+    files = [file for path in paths for file in definition_files(path)]
+    return {**entries, "definitions": sorted({file_hash(file) for file in files})} if files else entries
+
+
+def _together(topics: Iterable[OmittedTopic]) -> list[OmittedTopic]:
+    """Topics that several files leave out for one reason, each once."""
+    counts: Counter[tuple[str, str, str]] = Counter()
+    for one in topics:
+        counts[one.topic, one.message_type, one.reason] += one.messages
+    return [OmittedTopic(topic, type_, count, reason) for (topic, type_, reason), count in counts.items()]
 
 
 def _identity(connection: Connection) -> tuple[object, ...]:

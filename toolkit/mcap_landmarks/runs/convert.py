@@ -36,12 +36,13 @@ def convert(
     *,
     beside: Sequence[Location] = (),
     overwrite: bool = False,
+    strict: bool = False,
 ) -> Conversion:
     """Convert the logs of some inputs: into the file `output`, merged by time, or one by one into that folder.
 
     A folder is meant where an input has several logs, or where several inputs meet an `output` without `.mcap`. What is
     there is replaced if it was converted from the same inputs, or if it is to be overwritten; what is read `beside` the
-    inputs is not.
+    inputs is not. With `strict` a log with a topic that cannot be carried is refused, instead of written without it.
 
     Raises:
         ToolkitError: nothing could be converted; nothing is left behind.
@@ -60,7 +61,7 @@ def convert(
         for target, group in plan.items():
             earlier = earlier_recording("convert", [hashes[log.path] for log in group])
             try:
-                job = Job(target, group, selection, patterns)
+                job = Job(target, group, selection, patterns, strict=strict)
                 with (
                     output_to(target, (), earlier, overwrite=overwrite),
                     watch(f"convert to {target.name}", sum(log.size_bytes for log in group)) as advance,

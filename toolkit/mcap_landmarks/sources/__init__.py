@@ -5,9 +5,22 @@ import pkgutil
 from pathlib import Path
 
 from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.sources._bag_metadata import recorded_metadata
+from mcap_landmarks.sources._definition_files import definition_files
 from mcap_landmarks.sources._foxglove_types import counterpart
 from mcap_landmarks.sources._merge import Piece, merge
-from mcap_landmarks.sources._shape import Carried, Log, McapFile, NoConfig, Source, SourceLog
+from mcap_landmarks.sources._shape import (
+    BagDescription,
+    Carried,
+    Log,
+    McapFile,
+    NoConfig,
+    OmittedTopic,
+    Payload,
+    Source,
+    SourceLog,
+)
+from mcap_landmarks.sources._verification import defined, settled
 
 
 def source_names() -> tuple[str, ...]:
@@ -42,16 +55,23 @@ def source_of(path: Path) -> Source:
 
 
 __all__ = [
+    "BagDescription",
     "Carried",
     "Log",
     "McapFile",
     "NoConfig",
+    "OmittedTopic",
+    "Payload",
     "Piece",
     "Source",
     "SourceLog",
     "counterpart",
+    "defined",
+    "definition_files",
     "find_source",
     "merge",
+    "recorded_metadata",
+    "settled",
     "source_names",
     "source_of",
 ]

@@ -4,17 +4,26 @@ import contextlib
 import sqlite3
 from array import array
 from collections import Counter
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 import numpy as np
 import zstandard
 
 from mcap_landmarks.errors import MessageError, RecordingError
-from mcap_landmarks.messages.qos import KEY
 from mcap_landmarks.progress import Progress
-from mcap_landmarks.sources._ros2_types import check_fits, definition_in, known_distribution
+from mcap_landmarks.sources._db3_topics import (
+    Db3Topic,
+    about_in,
+    columns_of,
+    definitions_in,
+    distribution_in,
+    rows_of,
+    topic_of,
+)
+from mcap_landmarks.sources._definitions import Definitions
+from mcap_landmarks.sources._shape import Definition, OmittedTopic, Payload
+from mcap_landmarks.sources._verification import defined, settled
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 from mcap_landmarks.wording import counted
 
@@ -27,16 +36,7 @@ _Row = tuple[int, int, int, bytes]  # time, row id, topic id, data
 _Key = tuple[int, int]  # time, row id
 
 
-@dataclass(frozen=True, slots=True)
-class _Topic:
-    """A row of the table of topics. distribution: where the definition was taken from, None if the bag has it."""
-
-    connection: Connection
-    distribution: str | None
-    problem: str | None
-
-
-def unpacked(data: bytes | memoryview) -> bytes | memoryview:
+def unpacked(data: Payload) -> Payload:
     """A payload without the compression that a bag may have put on each message; CDR never begins like zstd.
 
     Raises:
@@ -55,34 +55,66 @@ def unpacked(data: bytes | memoryview) -> bytes | memoryview:
 
 
 class Db3Log:
-    """The log in one file. `distribution` gives the types that the file does not define."""
+    """The log in one file; `definitions` gives the types that the file does not define."""
 
-    def __init__(self, path: Path, distribution: str | None) -> None:
+    def __init__(self, path: Path, definitions: Definitions) -> None:
         self.losses: list[str] = []
+        self.left_out: list[OmittedTopic] = []
         self._path = path
         try:
             with _database(path) as database:
-                self._read_topics(database, distribution)
+                self._read_topics(database, definitions)
         except (sqlite3.DatabaseError, UnicodeDecodeError, KeyError, TypeError) as error:
             raise RecordingError(f"{path} is no ROS 2 bag, or too damaged to read: {error}; copy it again") from error
 
-    def _read_topics(self, database: sqlite3.Connection, distribution: str | None) -> None:
-        if not {"topics", "messages"} <= _columns(database, "sqlite_master", "name"):
+    def _read_topics(self, database: sqlite3.Connection, definitions: Definitions) -> None:
+        if not {"topics", "messages"} <= columns_of(database, "sqlite_master", "name"):
             raise RecordingError(f"{self._path} has no tables of topics and messages; it is no ROS 2 bag")
-        definitions = _definitions(database)
-        own = distribution or _distribution(database)
-        self._topics = {
-            int(row["id"]): _topic(dict(row), definitions, own) for row in _rows(database, "SELECT * FROM topics")
-        }
-        counts = self._count(database)
-        self.channels = [
-            ChannelSummary(topic.connection, counts[key])
-            for key, topic in self._topics.items()
-            if counts[key] or not topic.problem
-        ]
-        orphans = sum(count for key, count in counts.items() if key not in self._topics)
+        own, distribution = definitions_in(database), distribution_in(database)
+        known = definitions.also(distribution)
+        self.about = (self._path.name, about_in(database, distribution))
+        self._counts = self._count(database)
+        self._topics: dict[int, Db3Topic] = {}
+        rows = {int(row["id"]): dict(row) for row in rows_of(database, "SELECT * FROM topics")}
+        for key, row in rows.items():
+            try:
+                self._topics[key] = topic_of(row, own, known)
+            except MessageError as error:
+                self._leave_out(key, row["name"], row["type"], str(error))
+        orphans = sum(count for key, count in self._counts.items() if key not in rows)
         if orphans:
             self._lose(f"{counted(orphans, 'message')} of topics that are nowhere described left out")
+
+    @property
+    def channels(self) -> list[ChannelSummary]:
+        """See `Log`."""
+        return [ChannelSummary(topic.connection, self._counts[key]) for key, topic in self._topics.items()]
+
+    def verify(self, wanted: Callable[[str], bool]) -> None:
+        """See `Log`."""
+        unsure = {
+            key: topic.definitions
+            for key, topic in self._topics.items()
+            if topic.definitions and wanted(topic.connection.topic)
+        }
+        for key, found in settled(unsure, self._payloads).items():
+            connection = self._topics[key].connection
+            if isinstance(found, Definition):
+                self._topics[key] = Db3Topic(defined(connection, found))
+            else:
+                del self._topics[key]
+                self._leave_out(key, connection.topic, connection.message_type, found)
+
+    def _payloads(self, keys: Collection[int]) -> Iterator[tuple[int, Payload]]:
+        """The messages of some topics as they were sent; what cannot be decompressed is told of when it is read."""
+        for _, _, key, data in self._ordered(_FIRST, _LAST):
+            if key in keys and isinstance(data, bytes):
+                with contextlib.suppress(MessageError):
+                    yield key, unpacked(data)
+
+    def _leave_out(self, key: int, topic: str, message_type: str, reason: str) -> None:
+        if self._counts[key]:
+            self.left_out.append(OmittedTopic(topic, message_type, self._counts[key], reason))
 
     def _count(self, database: sqlite3.Connection) -> Counter[int]:
         counts: Counter[int] = Counter()
@@ -118,11 +150,7 @@ class Db3Log:
         end_ns: int | None = None,
         progress: Progress | None = None,
     ) -> Iterator[RawMessage]:
-        """See `Log`.
-
-        Raises:
-            RecordingError: a wanted topic has no definition, or messages that do not fit the one of the distribution.
-        """
+        """See `Log`."""
         wanted = self._wanted(connections)
         first, end = _FIRST if start_ns is None else start_ns, _LAST if end_ns is None else end_ns
         read = 0
@@ -137,36 +165,20 @@ class Db3Log:
             if key in wanted:
                 payload = self._payload(wanted[key], data)
                 if payload is not None:
-                    yield RawMessage(wanted[key].connection, time_ns, time_ns, 0, payload)
+                    yield RawMessage(wanted[key], time_ns, time_ns, 0, payload)
         if progress:
             progress(read)
 
-    def _wanted(self, connections: Collection[Connection] | None) -> dict[int, _Topic]:
-        wanted = {
-            key: topic for key, topic in self._topics.items() if connections is None or topic.connection in connections
-        }
-        counted = {summary.connection for summary in self.channels}
-        for topic in wanted.values():
-            if topic.problem and topic.connection in counted:
-                raise RecordingError(f"{self._path}: {topic.problem}")
-        return wanted
+    def _wanted(self, connections: Collection[Connection] | None) -> dict[int, Connection]:
+        there = {key: topic.connection for key, topic in self._topics.items()}
+        return {key: one for key, one in there.items() if connections is None or one in connections}
 
-    def _payload(self, topic: _Topic, data: bytes) -> bytes | memoryview | None:
-        connection = topic.connection
+    def _payload(self, connection: Connection, data: bytes) -> Payload | None:
         try:
-            payload = unpacked(data)
+            return unpacked(data)
         except MessageError as error:
             self._lose(f"{connection.topic}: {error}; such messages are left out")
             return None
-        if topic.distribution:
-            try:
-                check_fits(topic.distribution, connection.message_type, payload)
-            except MessageError as error:
-                raise RecordingError(
-                    f"{self._path}: topic {connection.topic}: {error}; name the distribution it was recorded with: "
-                    "--distro NAME, or leave the topic out with --topics"
-                ) from error
-        return payload
 
     def _ordered(self, first_ns: int, end_ns: int) -> Iterator[_Row]:
         """Rows by time, from the file's index while it lasts, from the rows themselves where that is damaged."""
@@ -199,57 +211,6 @@ def _database(path: Path) -> Iterator[sqlite3.Connection]:
 def _number(value: object) -> int:
     """A time as recordings can hold it, zero for anything else that a damaged row may have there."""
     return value if isinstance(value, int) and value >= 0 else 0
-
-
-def _rows(database: sqlite3.Connection, query: str) -> list[sqlite3.Row]:
-    return database.execute(query).fetchall()
-
-
-def _columns(database: sqlite3.Connection, table: str, column: str) -> set[str]:
-    return {str(row[column]) for row in _rows(database, f"SELECT {column} FROM {table}")}  # noqa: S608 - our own names
-
-
-def _definitions(database: sqlite3.Connection) -> dict[str, tuple[str, str]]:
-    """Encoding and text by type, of those that the file defines."""
-    if "message_definitions" not in _columns(database, "sqlite_master", "name"):
-        return {}
-    found = _rows(database, "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
-    return {row[0]: (row[1], row[2]) for row in found if row[1] in {"ros2msg", "ros2idl"}}
-
-
-def _distribution(database: sqlite3.Connection) -> str | None:
-    """What the file itself calls the distribution it was recorded with, if that is one."""
-    if "schema" not in _columns(database, "sqlite_master", "name"):
-        return None
-    names = [str(dict(row).get("ros_distro", "")) for row in _rows(database, "SELECT * FROM schema")]
-    return next((name for name in names if known_distribution(name)), None)
-
-
-def _topic(row: dict[str, str], definitions: dict[str, tuple[str, str]], distribution: str | None) -> _Topic:
-    name, message_type = row["name"], row["type"]
-    metadata = {KEY: row.get("offered_qos_profiles") or ""}
-    if digest := row.get("type_description_hash"):
-        metadata["topic_type_hash"] = digest
-    problem = None
-    if row["serialization_format"] != "cdr":
-        problem = f"topic {name} is {row['serialization_format']}, not CDR; leave it out with --topics"
-    if message_type in definitions:
-        encoding, text = definitions[message_type]
-        return _Topic(Connection(name, message_type, text.encode(), encoding, metadata=metadata), None, problem)
-    text_or_none = definition_in(distribution, message_type) if distribution else None
-    if problem is None and text_or_none is None:
-        who = (
-            f"neither the file nor {distribution} has"
-            if distribution
-            else "the file, which names no distribution, lacks"
-        )
-        problem = (
-            f"topic {name}: {who} the definition of {message_type}; name the distribution it was recorded with, such "
-            "as --distro humble, or leave the topic out with --topics"
-        )
-    return _Topic(
-        Connection(name, message_type, (text_or_none or "").encode(), metadata=metadata), distribution, problem
-    )
 
 
 def _by_time(database: sqlite3.Connection, first_ns: int, end_ns: int) -> Iterator[_Row]:

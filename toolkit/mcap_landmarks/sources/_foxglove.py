@@ -23,20 +23,16 @@ Read = Callable[[Payload], FieldsOf]
 
 
 def carry_foxglove(connection: Connection, found: Counterpart) -> Carried:
-    """How a connection is carried on as its counterpart; what cannot be understood is told of each of its messages."""
+    """How a connection is carried on as its counterpart.
+
+    Raises:
+        MessageError: its schema cannot be understood.
+    """
     latched = connection.topic.endswith(TF_STATIC.topic) and found.ros_type == TFMessage.ROS_TYPE
     quality = connection.metadata.get(KEY) or qos_profile(latched=latched)
     schema = definition(found.ros_type).encode()
     target = Connection(connection.topic, found.ros_type, schema, metadata={**connection.metadata, KEY: quality})
-    try:
-        read = _reader(connection)
-    except MessageError as error:
-        problem = str(error)
-
-        def refuse(_data: Payload) -> Payload:
-            raise MessageError(problem)
-
-        return Carried(target, refuse)
+    read = _reader(connection)
     if found is COUNTERPARTS["LaserScan"]:
         frame = ScanFrame(connection.topic, read)
         return Carried(target, _conversion(connection, found, read, frame.put), frame.mount)

@@ -36,7 +36,7 @@ from mcap_landmarks.sources._mrclam_robot import (
     odometry_covariance,
     scans,
 )
-from mcap_landmarks.sources._shape import Source, SourceLog
+from mcap_landmarks.sources._shape import OmittedTopic, Source, SourceLog
 from mcap_landmarks.stage import Channel, ChannelSummary, Connection, RawMessage
 
 _BARCODES, _LANDMARKS = "Barcodes.dat", "Landmark_Groundtruth.dat"
@@ -108,12 +108,16 @@ class RobotLog:
     """The log of one robot, made up from its tables."""
 
     losses: Sequence[str] = ()
+    left_out: Sequence[OmittedTopic] = ()
 
     def __init__(self, tracks: list[_Track]) -> None:
         self._tracks = [track for track in tracks if len(track.time_ns)]
         self.channels = [ChannelSummary(track.connection, len(track.time_ns)) for track in self._tracks]
         self.start_ns = min((int(track.time_ns[0]) for track in self._tracks), default=None)
         self.end_ns = max((int(track.time_ns[-1]) for track in self._tracks), default=None)
+
+    def verify(self, wanted: Callable[[str], bool]) -> None:
+        """See `Log`; all definitions are ours."""
 
     def messages(
         self,

@@ -2,7 +2,7 @@
 
 import contextlib
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from mcap_landmarks.sources._bag_container import MAGIC, BagConnection, BagMessa
 from mcap_landmarks.sources._bag_index import BagIndex, read_chunk, read_index
 from mcap_landmarks.sources._merge import merge
 from mcap_landmarks.sources._ros1_types import Convert, converted
-from mcap_landmarks.sources._shape import NoConfig, Source, SourceLog
+from mcap_landmarks.sources._shape import NoConfig, OmittedTopic, Source, SourceLog
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 from mcap_landmarks.wording import counted
 
@@ -32,7 +32,7 @@ def open_bag(path: Path, _config: NoConfig) -> Iterator[Sequence[SourceLog]]:
     """The one log of a bag.
 
     Raises:
-        RecordingError: it is no bag of format 2.0, is encrypted, or has a type that cannot be understood.
+        RecordingError: it is no bag of format 2.0, or is encrypted.
     """
     size = path.stat().st_size
     with path.open("rb") as stream:
@@ -55,22 +55,30 @@ class BagLog:
     def __init__(self, path: Path, size: int, index: BagIndex) -> None:
         self.losses = [f"{path.name}: {loss}" for loss in index.losses]
         self._path, self._size, self._chunks = path, size, [chunk for chunk in index.chunks if chunk.counts]
-        self._connections: dict[int, Connection] = {}
-        self._convert: dict[Connection, Convert | MessageError] = {}
-        shared: dict[BagConnection, Connection] = {}
-        for key, described in sorted(index.connections.items()):
-            if described not in shared:
-                shared[described], convert = _carried(described)
-                self._convert[shared[described]] = convert
-            self._connections[key] = shared[described]
-        counts: Counter[Connection] = Counter()
-        for key, count in index.counts().items():
-            if key in self._connections:  # the others are told of when they are read
-                counts[self._connections[key]] += count
-        self.channels = [ChannelSummary(connection, counts[connection]) for connection in shared.values()]
+        self._known = frozenset(index.connections)
+        self._carried: dict[int, tuple[Connection, Convert]] = {}
+        self.left_out: list[OmittedTopic] = []
+        self.channels = self._connect(index)
         self.start_ns = min((chunk.start_ns for chunk in self._chunks), default=None)
         self.end_ns = max((chunk.end_ns for chunk in self._chunks), default=None)
         self._misfits: Counter[Connection] = Counter()
+
+    def _connect(self, index: BagIndex) -> list[ChannelSummary]:
+        """The channels of a bag that can be carried; `_carried` and `left_out` are filled."""
+        counts: Counter[BagConnection] = Counter()
+        for key, count in index.counts().items():
+            if key in index.connections:  # the others are told of when they are read
+                counts[index.connections[key]] += count
+        shared: dict[BagConnection, tuple[Connection, Convert] | None] = {}
+        for key, described in sorted(index.connections.items()):
+            if described not in shared:
+                shared[described] = self._carry(described, counts[described])
+            if carried := shared[described]:
+                self._carried[key] = carried
+        return [ChannelSummary(one[0], counts[described]) for described, one in shared.items() if one]
+
+    def verify(self, wanted: Callable[[str], bool]) -> None:
+        """See `Log`."""
 
     def messages(
         self,
@@ -79,13 +87,8 @@ class BagLog:
         end_ns: int | None = None,
         progress: Progress | None = None,
     ) -> Iterator[RawMessage]:
-        """See `Log`; a message that does not fit its definition is left out and told in `losses`.
-
-        Raises:
-            RecordingError: the definition of a wanted type cannot be understood.
-        """
-        wanted = {key: c for key, c in self._connections.items() if connections is None or c in connections}
-        carried = {key: (connection, self._conversion(connection)) for key, connection in wanted.items()}
+        """See `Log`; a message that does not fit its definition is left out and told in `losses`."""
+        carried = {key: one for key, one in self._carried.items() if connections is None or one[0] in connections}
         first, last = start_ns or 0, 2**64 if end_ns is None else end_ns
         chunks = [chunk for chunk in self._chunks if chunk.end_ns >= first and chunk.start_ns < last]
         return merge(
@@ -125,17 +128,20 @@ class BagLog:
             self._lose(f"{where}{why} lacks {missing} of {counted(sum(chunk.counts.values()), 'message')}")
         elif problem:
             self._lose(f"{where} is damaged ({problem}); {counted(len(found), 'message')} before that taken")
-        orphans = sum(message.connection_id not in self._connections for message in found)
+        orphans = sum(message.connection_id not in self._known for message in found)
         if orphans:
             self._lose(f"{counted(orphans, 'message')} of {where} without a connection left out")
         return found
 
-    def _conversion(self, connection: Connection) -> Convert:
-        convert = self._convert[connection]
-        if isinstance(convert, MessageError):
-            remedy = "leave the topic out with --topics"
-            raise RecordingError(f"{self._path}: topic {connection.topic}: {convert}; {remedy}") from convert
-        return convert
+    def _carry(self, described: BagConnection, count: int) -> tuple[Connection, Convert] | None:
+        """What stands for a connection, and what converts its messages; None if nothing can."""
+        try:
+            return _carried(described)
+        except MessageError as error:
+            if count:
+                topic, ros_type = _topic(described.topic), full_name(described.ros_type)
+                self.left_out.append(OmittedTopic(topic, ros_type, count, str(error)))
+            return None
 
     def _lose(self, text: str) -> None:
         text = f"{self._path.name}: {text}"
@@ -149,16 +155,22 @@ class BagLog:
             self._lose(f"{connection.topic}: {error}; such messages are left out")
 
 
-def _carried(described: BagConnection) -> tuple[Connection, Convert | MessageError]:
-    """The ROS 2 connection that stands for one of the bag, and what converts its messages or why nothing can."""
-    slash = "/" if described.topic.startswith("/") else ""
-    topic = slash + "/".join(part for part in described.topic.split("/") if part)
+def _topic(name: str) -> str:
+    """A topic as ROS 2 has it, without empty names between its slashes."""
+    return ("/" if name.startswith("/") else "") + "/".join(part for part in name.split("/") if part)
+
+
+def _carried(described: BagConnection) -> tuple[Connection, Convert]:
+    """The ROS 2 connection that stands for one of the bag, and what converts its messages.
+
+    Raises:
+        MessageError: the definition cannot be understood.
+    """
+    type_ = converted(described.ros_type, described.definition)
     metadata = {KEY: qos_profile(latched=described.latched)}
-    try:
-        type_ = converted(described.ros_type, described.definition)
-    except MessageError as error:
-        return Connection(topic, full_name(described.ros_type), b"", metadata=metadata), error
-    return Connection(topic, type_.message_type, type_.definition.encode(), metadata=metadata), type_.convert
+    return Connection(
+        _topic(described.topic), type_.message_type, type_.definition.encode(), metadata=metadata
+    ), type_.convert
 
 
 SOURCE = Source("rosbag1", "ROS 1 bags (.bag)", NoConfig, recognises, open_bag)
