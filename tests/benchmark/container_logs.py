@@ -44,7 +44,9 @@ def odometry(count: int, rate_hz: int = 50) -> Iterator[RawMessage]:
     for i in range(count):
         time_ns = START_NS + i * step_ns
         pose = np.array([np.cos(i / 300), np.sin(i / 300), i / 300 % 6]) + noise[i]
-        yield raw(on, time_ns, i, Odometry.planar(time_ns, ("odom", "base_footprint"), pose, np.diag([0.01, 0.01, 0.1])))
+        yield raw(
+            on, time_ns, i, Odometry.planar(time_ns, ("odom", "base_footprint"), pose, np.diag([0.01, 0.01, 0.1]))
+        )
 
 
 def transforms(count: int, rate_hz: int = 50) -> Iterator[RawMessage]:

@@ -1,16 +1,15 @@
-"""Blocks of a recording to messages: decompress, check, parse."""
+"""Blocks of a recording to records: decompress, check, part."""
 
-import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from struct import error as struct_error
 from typing import BinaryIO
 
 import lz4.frame
 import zstandard
 
-from mcap_landmarks.recording.container import CHUNK, LARGEST_CHUNK, MESSAGE, MESSAGE_FIXED, RECORD, Opcode
+from mcap_landmarks.recording.checksum import crc32
+from mcap_landmarks.recording.container import CHUNK, LARGEST_CHUNK, RECORD, Opcode
 from mcap_landmarks.recording.summary_index import Block
-from mcap_landmarks.stage import Connection, RawMessage
 
 
 class DamagedBlockError(ValueError):
@@ -29,12 +28,12 @@ def chunk_content(record: bytes | memoryview, *, verify: bool) -> memoryview:
     content = _decompress(compression, data, size)
     if len(content) != size:
         raise DamagedBlockError(f"it holds {len(content)} bytes instead of {size}")
-    if verify and crc and zlib.crc32(content) != crc:
+    if verify and crc and crc32(content) != crc:
         raise DamagedBlockError("its CRC does not match")
     return content
 
 
-def cut_chunk_content(record: bytes) -> memoryview:
+def cut_chunk_content(record: bytes | memoryview) -> memoryview:
     """What can be had of a chunk that the end of the file cuts: its first whole records. Their CRC is unknown.
 
     Raises:
@@ -107,45 +106,21 @@ def records_in(content: memoryview) -> Iterator[tuple[int, int, int]]:
         yield opcode, start, position
 
 
-def block_messages(
-    stream: BinaryIO, block: Block, wanted: Mapping[int, Connection], *, verify: bool
-) -> list[RawMessage]:
-    """The wanted channels' messages of a block, by log time; messages of equal time keep their order.
+def block_content(stream: BinaryIO, block: Block, *, verify: bool) -> memoryview:
+    """The uncompressed records of a block.
 
     Raises:
-        DamagedBlockError: the block cannot be trusted; none of its messages is.
+        DamagedBlockError: the block cannot be trusted.
     """
     stream.seek(block.offset)
     raw = stream.read(block.length)
     if len(raw) < block.length:
         raise DamagedBlockError("the file ends within it")
     if block.head:
-        content = chunk_content(block.head + raw, verify=verify)
-    elif block.is_chunk:
+        return chunk_content(block.head + raw, verify=verify)
+    if block.is_chunk:
         if raw[0] != Opcode.CHUNK:
             raise DamagedBlockError("there is no chunk where the summary says")
-        record = raw[RECORD.size :]
-        content = cut_chunk_content(record) if block.is_cut else chunk_content(record, verify=verify)
-    else:
-        content = memoryview(raw)
-    found: list[RawMessage] = []
-    append, unpack, get = found.append, MESSAGE.unpack_from, wanted.get
-    ordered, last = True, 0
-    for opcode, start, end in records_in(content):
-        if opcode != Opcode.MESSAGE:
-            continue
-        if end - start < MESSAGE_FIXED:
-            raise DamagedBlockError("a message in it is cut")
-        _, _, channel_id, sequence, log_time, publish_time = unpack(content, start - RECORD.size)
-        connection = get(channel_id)
-        if connection is not None:
-            append(RawMessage(connection, log_time, publish_time, sequence, content[start + MESSAGE_FIXED : end]))
-            ordered = ordered and log_time >= last
-            last = log_time
-    if not ordered:
-        found.sort(key=_log_time)
-    return found
-
-
-def _log_time(message: RawMessage) -> int:
-    return message.log_time_ns
+        record = memoryview(raw)[RECORD.size :]
+        return cut_chunk_content(record) if block.is_cut else chunk_content(record, verify=verify)
+    return memoryview(raw)

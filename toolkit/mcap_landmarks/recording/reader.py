@@ -2,10 +2,10 @@
 
 import contextlib
 import hashlib
-import heapq
 from collections.abc import Collection, Iterable, Iterator
 from contextvars import ContextVar
 from functools import cached_property
+from itertools import chain
 from typing import BinaryIO
 
 from mcap import records
@@ -14,8 +14,9 @@ from mcap.exceptions import McapError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, STAGE, carried_fingerprint
 from mcap_landmarks.progress import Progress
-from mcap_landmarks.recording.blocks import DamagedBlockError, block_messages
+from mcap_landmarks.recording.blocks import DamagedBlockError, block_content
 from mcap_landmarks.recording.chunk_copy import WholeChunk, read_whole
+from mcap_landmarks.recording.chunk_messages import Open, drain, messages_in, push
 from mcap_landmarks.recording.container import CHUNK, RECORD, parse
 from mcap_landmarks.recording.damage import SuspectChunk
 from mcap_landmarks.recording.declared_channels import Declared
@@ -25,9 +26,6 @@ from mcap_landmarks.recording.summary_index import Block, Index, indexed_message
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 
 _from_front: ContextVar[bool] = ContextVar("from_front", default=False)
-
-_Open = list[tuple[int, int, int, list[RawMessage]]]
-"""Blocks that are open: the time of the next message, the number of the block, that of the message, all messages."""
 
 
 @contextlib.contextmanager
@@ -149,7 +147,7 @@ class Recording:
         Holds only the chunks in memory that overlap in time. `progress` is told the bytes of each chunk that was read.
         """
         wanted, first, last = self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns
-        yield from _within(self._merge(self._blocks(wanted, first, last), wanted, progress), first, last)
+        return chain.from_iterable(self._runs(wanted, (first, last), progress))
 
     def pieces(
         self,
@@ -166,20 +164,20 @@ class Recording:
         """
         wanted, first, last = self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns
         ids = frozenset(self._wanted(kept)) & wanted.keys()
-        active: _Open = []
+        active: Open = []
         for number, block in enumerate(self._blocks(wanted, first, last)):
-            yield from _within(_drain(active, block.start_ns), first, last)
+            yield from chain.from_iterable(drain(active, block.start_ns))
             chunk = None
             if first <= block.start_ns and block.end_ns < last:
                 chunk = read_whole(self._stream, block, ids, declared, verify=self._verify)
             if chunk is not None:
-                yield from _within(_drain(active, block.start_ns + 1), first, last)
+                yield from chain.from_iterable(drain(active, block.start_ns + 1))
                 if progress:
                     progress(block.length)
                 yield chunk
-            elif messages := self._load(block, wanted, progress):
-                heapq.heappush(active, (messages[0].log_time_ns, number, 0, messages))
-        yield from _within(_drain(active, 2**64), first, last)
+            else:
+                push(active, number, self._load(block, wanted, progress), first, last)
+        yield from chain.from_iterable(drain(active, 2**64))
 
     def ids(self, connection: Connection) -> tuple[int, int]:
         """The ids of a connection's channel and schema."""
@@ -212,7 +210,7 @@ class Recording:
 
     def _load(self, block: Block, wanted: dict[int, Connection], progress: Progress | None) -> list[RawMessage]:
         try:
-            found = block_messages(self._stream, block, wanted, verify=self._verify)
+            found = messages_in(block_content(self._stream, block, verify=self._verify), wanted)
         except DamagedBlockError as error:
             self.damage = self.damage.with_suspect(
                 SuspectChunk(block.offset, indexed_messages(self._stream, block), str(error))
@@ -222,38 +220,15 @@ class Recording:
             progress(block.length)
         return found
 
-    def _merge(
-        self, blocks: list[Block], wanted: dict[int, Connection], progress: Progress | None
-    ) -> Iterator[RawMessage]:
-        """Messages of blocks that are sorted by their start, which may overlap."""
-        active: _Open = []
-        for number, block in enumerate(blocks):
-            yield from _drain(active, block.start_ns)
-            messages = self._load(block, wanted, progress)
-            if messages:
-                heapq.heappush(active, (messages[0].log_time_ns, number, 0, messages))
-        yield from _drain(active, 2**64)
-
-
-def _within(messages: Iterable[RawMessage], first_ns: int, last_ns: int) -> Iterator[RawMessage]:
-    for message in messages:
-        if first_ns <= message.log_time_ns < last_ns:
-            yield message
-
-
-def _drain(active: _Open, until_ns: int) -> Iterator[RawMessage]:
-    """Messages before `until_ns`, in order, from the heap of open blocks; of equal times the earlier block's first."""
-    while active and active[0][0] < until_ns:
-        _, number, position, messages = heapq.heappop(active)
-        rival_ns, rival = (active[0][0], active[0][1]) if active else (until_ns, -1)
-        end = len(messages)
-        while position < end:
-            time_ns = messages[position].log_time_ns
-            if time_ns >= until_ns or time_ns > rival_ns or (time_ns == rival_ns and number > rival):
-                heapq.heappush(active, (time_ns, number, position, messages))
-                break
-            yield messages[position]
-            position += 1
+    def _runs(
+        self, wanted: dict[int, Connection], within_ns: tuple[int, int], progress: Progress | None
+    ) -> Iterator[Iterable[RawMessage]]:
+        """Messages in the order of time, in runs of one block; blocks may overlap."""
+        active: Open = []
+        for number, block in enumerate(self._blocks(wanted, *within_ns)):
+            yield from drain(active, block.start_ns)
+            push(active, number, self._load(block, wanted, progress), *within_ns)
+        yield from drain(active, 2**64)
 
 
 def _connection(index: Index, channel: records.Channel) -> Connection:

@@ -1,12 +1,12 @@
 """Index a recording by reading it once from the front, in bounded memory: for want of a summary that can be trusted."""
 
-import zlib
 from collections.abc import Callable
 from typing import BinaryIO
 
 from mcap import records
 from mcap.exceptions import McapError
 
+from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.container import LARGEST_CHUNK, MAGIC, MESSAGE_FIXED, RECORD, Opcode, parse
 from mcap_landmarks.recording.findings import Findings
 from mcap_landmarks.recording.loose_messages import LooseMessages
@@ -148,7 +148,7 @@ class _Scanner:
 
     def _crc(self, begin: int, end: int, crc: int = 0) -> int:
         for start in range(begin, end, _PIECE):
-            crc = zlib.crc32(self._read(start, min(_PIECE, end - start)), crc)
+            crc = crc32(self._read(start, min(_PIECE, end - start)), crc)
         return crc
 
     def _statistics(self, offset: int, length: int) -> None:

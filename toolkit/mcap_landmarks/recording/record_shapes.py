@@ -1,9 +1,9 @@
 """Which fields the records of MCAP have, and whether bytes can be such a record: without parsing, and strictly."""
 
-import zlib
 from collections.abc import Callable
 from struct import Struct
 
+from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.container import RECORD, Opcode
 
 _P4, _P8 = -4, -8
@@ -80,7 +80,7 @@ def check_attachment(content: bytes) -> None:
     if end is None:
         raise ValueError("no attachment")
     crc = int.from_bytes(content[end - 4 : end], "little")
-    if crc and zlib.crc32(memoryview(content)[: end - 4]) != crc:
+    if crc and crc32(memoryview(content)[: end - 4]) != crc:
         raise ValueError("its CRC does not match")
 
 

@@ -1,11 +1,11 @@
 """The summary at the end of a recording: written after the data, read before it."""
 
-import zlib
 from collections.abc import Sequence
 from io import BytesIO
 
 from mcap import records
 
+from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.container import MAGIC, RECORD, Opcode, serialize
 
 _OPCODES = {
@@ -35,5 +35,5 @@ def summary_section(groups: Sequence[Sequence[records.McapRecord]], offset: int)
     out.write(serialize(*offsets))
     out.write(RECORD.pack(Opcode.FOOTER, 20))
     out.write(offset.to_bytes(8, "little") + offsets_start.to_bytes(8, "little"))
-    crc = zlib.crc32(out.getvalue())
+    crc = crc32(out.getvalue())
     return out.getvalue() + crc.to_bytes(4, "little") + MAGIC

@@ -1,7 +1,6 @@
 """What a recording holds and where: taken from its summary, where that can be trusted."""
 
 import contextlib
-import zlib
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field, replace
 from struct import Struct
@@ -11,6 +10,7 @@ from typing import BinaryIO, NamedTuple
 from mcap import records
 from mcap.exceptions import McapError
 
+from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.container import FOOTER_SIZE, MAGIC, RECORD, Opcode, parse
 from mcap_landmarks.recording.damage import Damage
 from mcap_landmarks.recording.index_check import DistrustedIndexError, check_index
@@ -137,7 +137,7 @@ def read_summary(stream: BinaryIO, size: int) -> Summary:
         return Summary(footer, is_damaged=True)
     stream.seek(footer.summary_start)
     section = stream.read(size - tail - footer.summary_start)
-    crc = zlib.crc32(end[: FOOTER_SIZE - 4], zlib.crc32(section))
+    crc = crc32(end[: FOOTER_SIZE - 4], crc32(section))
     return Summary(footer, section, is_damaged=bool(footer.summary_crc) and crc != footer.summary_crc)
 
 

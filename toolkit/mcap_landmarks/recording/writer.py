@@ -2,7 +2,6 @@
 
 import contextlib
 import hashlib
-import zlib
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ from mcap_landmarks.manifest import CONTENT, RUN, STAGE, entry_text
 from mcap_landmarks.messages.codec import Message, encode
 from mcap_landmarks.messages.qos import KEY, qos_profile
 from mcap_landmarks.messages.typestore import definition
+from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.chunk_copy import WholeChunk, compressed
 from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, serialize
 from mcap_landmarks.recording.declared_channels import Declared
@@ -243,7 +243,7 @@ class RecordingWriter:
             data=content,
             message_start_time=chunk.start_ns,
             message_end_time=chunk.end_ns,
-            uncompressed_crc=zlib.crc32(chunk.data),
+            uncompressed_crc=crc32(chunk.data),
             uncompressed_size=len(chunk.data),
         )
         indexes = {}
@@ -279,4 +279,4 @@ class RecordingWriter:
     def _put(self, data: bytes) -> None:
         self._stream.write(data)
         self._offset += len(data)
-        self._crc = zlib.crc32(data, self._crc)
+        self._crc = crc32(data, self._crc)

@@ -1,0 +1,15 @@
+"""The CRC-32 of chunks and files."""
+
+try:
+    from zlib_ng.zlib_ng import crc32 as _crc32
+except ModuleNotFoundError:  # there is no wheel for the machine
+    from zlib import crc32 as _crc32
+
+
+def crc32(data: bytes | bytearray | memoryview, before: int = 0) -> int:
+    """The CRC-32 of bytes that follow others with the CRC `before`.
+
+    zlib-ng's takes 15 GB/s where zlib's takes 2 (blocks of 1 MiB, one core of a server of 2024), in which reading
+    images would spend two thirds of its time; where zlib-ng is missing, zlib's gives the same.
+    """
+    return int(_crc32(data, before))
