@@ -2,6 +2,7 @@
 
 import io
 import struct
+import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -93,6 +94,12 @@ def _chunk(data: bytes, number: int) -> Record:
 
 def _no_summary_crc(data: bytes) -> bytes:
     return put(data, len(data) - 12, bytes(4))
+
+
+def with_summary_crc(data: bytes) -> bytes:
+    """The data with the CRC over the summary that it should have."""
+    section = data[int.from_bytes(data[-28:-20], "little") : -12]
+    return put(data, len(data) - 12, zlib.crc32(section).to_bytes(4, "little"))
 
 
 def _flipped(share: float) -> Damage:

@@ -1,7 +1,6 @@
 """Damaged recordings: whatever the damage, a clear error or what can be had, and never a crash."""
 
 import contextlib
-import zlib
 from collections import Counter
 from pathlib import Path
 
@@ -11,7 +10,18 @@ from mcap_landmarks.errors import RecordingError, ToolkitError
 from mcap_landmarks.recording.damage import Damage
 from mcap_landmarks.recording.reader import open_recording, reading_from_front
 
-from tests.recording.damages import CHUNK, CHUNK_INDEX, DAMAGES, MESSAGES, Truth, flip, of_kind, put, write
+from tests.recording.damages import (
+    CHUNK,
+    CHUNK_INDEX,
+    DAMAGES,
+    MESSAGES,
+    Truth,
+    flip,
+    of_kind,
+    put,
+    with_summary_crc,
+    write,
+)
 from tests.recording.test_writer import write_log
 
 RECOVERED = {
@@ -92,19 +102,10 @@ def test_a_suspect_chunk_is_told_with_its_messages_and_where_reading_went_on(tmp
 def test_an_index_that_names_chunks_twice_doubles_nothing(tmp_path: Path) -> None:
     data, truth = write()
     first, second = of_kind(data, CHUNK_INDEX)[:2]
-    start = of_kind(data, CHUNK_INDEX)[0].start
-    twice = put(data, first.start, data[second.start : second.end])
-    section = twice[_summary_start(data) : -12]
-    twice = put(twice, len(twice) - 12, zlib.crc32(section).to_bytes(4, "little"))  # its CRC is right again
-    assert start == first.start
-    (tmp_path / "a.mcap").write_bytes(twice)
+    (tmp_path / "a.mcap").write_bytes(with_summary_crc(put(data, first.start, data[second.start : second.end])))
     found, account, _ = _read(tmp_path / "a.mcap")
     assert Counter(found) == Counter(truth)
     assert "its summary is not right" in account.notes[0]
-
-
-def _summary_start(data: bytes) -> int:
-    return int.from_bytes(data[-28:-20], "little")
 
 
 def test_chunks_without_a_crc_are_named_as_unverified_and_no_loss(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import table
-from mcap_landmarks.cli.option_groups import LogOptions, ScanOptions
+from mcap_landmarks.cli.option_groups import LogOptions, ScanOptions, reading_logs
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.locations import Location, location
 
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from mcap_landmarks.runs.pipeline import LogRun
 
 
+@reading_logs
 def command(
     logs: Annotated[
         list[Location], typer.Argument(metavar="LOG...", parser=location, help="Recordings (MCAP) with LiDAR scans.")

@@ -6,6 +6,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, warn
+from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.locations import Location, location
 from mcap_landmarks.wording import counted
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from mcap_landmarks.runs.convert import Conversion
 
 
+@reading_logs
 def command(
     inputs: Annotated[
         list[Location],

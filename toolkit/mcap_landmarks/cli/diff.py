@@ -9,6 +9,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import DONE, USAGE, progress, say, say_json, table, warn
+from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.locations import Location, location, size_of
 from mcap_landmarks.moments import moment
@@ -26,6 +27,7 @@ _LONGEST = 60
 _HASH = re.compile("[0-9a-f]{32,}")
 
 
+@reading_logs
 def command(
     baseline: Annotated[
         Location, typer.Argument(metavar="BASELINE", parser=location, help="A log with results, or a MAP.db.")

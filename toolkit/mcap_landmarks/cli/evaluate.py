@@ -9,6 +9,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
+from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.locations import Location, location, size_of
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ class PoseAssociation(StrEnum):
     NEAREST = "nearest"
 
 
+@reading_logs
 def command(
     result: Annotated[
         Location,

@@ -8,6 +8,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, say_json, table
+from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.locations import Location, location
 from mcap_landmarks.moments import moment
 from mcap_landmarks.wording import counted
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from mcap_landmarks.report.explain_reading import SensorData
 
 
+@reading_logs
 def command(
     result: Annotated[
         Location, typer.Argument(metavar="RESULT", parser=location, help="A log with results, as localize writes it.")

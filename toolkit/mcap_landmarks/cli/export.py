@@ -6,6 +6,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, warn
+from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.locations import Location, location, size_of
 from mcap_landmarks.wording import counted
 
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from mcap_landmarks.evaluation.export import TrajectoryFormat
 
 
+@reading_logs
 def command(
     result: Annotated[Location, typer.Argument(metavar="RESULT", parser=location, help="A log with poses.")],
     output: options.Output,

@@ -9,6 +9,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
+from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.locations import Location, location
 from mcap_landmarks.moments import moment
 from mcap_landmarks.wording import counted
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from mcap_landmarks.inspection.info import LogInfo
 
 
+@reading_logs
 def command(
     paths: Annotated[
         list[Location], typer.Argument(metavar="PATH...", parser=location, help="Recordings (MCAP), bags or data sets.")
@@ -39,11 +41,17 @@ def command(
         say_json("info", documents[0] if len(documents) == 1 else {"logs": documents})
     else:
         _print(logs)
-    for log in logs:
-        for loss in log.losses:
-            warn(f"warning: {loss}")
+    _tell(logs)
     if any(log.losses or log.problems for log in logs):
         raise typer.Exit(PARTIAL)
+
+
+def _tell(logs: "Sequence[LogInfo]") -> None:
+    for log in logs:
+        for note in log.notes:
+            warn(f"note: {note}")
+        for loss in log.losses:
+            warn(f"warning: {loss}")
 
 
 def _document(log: "LogInfo") -> dict[str, object]:
@@ -68,6 +76,7 @@ def _document(log: "LogInfo") -> dict[str, object]:
         "missing": log.missing,
         "blocked": {verb: list(topics) for verb, topics in log.blocked.items()},
         "losses": list(log.losses),
+        "notes": list(log.notes),
         **({} if log.findings is None else {"findings": [dataclasses.asdict(finding) for finding in log.findings]}),
         **({} if log.findings is None else {"network": log.network}),
     }

@@ -7,7 +7,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
-from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, reading_logs
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from mcap_landmarks.runs.pipeline import LogRun
 
 
+@reading_logs
 def command(
     logs: Annotated[list[Location], typer.Argument(metavar="LOG...", parser=location, help="Recordings (MCAP).")],
     map_file: options.MapFile,

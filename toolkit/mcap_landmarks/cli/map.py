@@ -8,7 +8,7 @@ import typer
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table
-from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, reading_logs
 from mcap_landmarks.cli.stage_runs import Given, tell, told
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from mcap_landmarks.runs.session import StageRun
 
 
+@reading_logs
 def command(
     logs: Annotated[
         list[Location], typer.Argument(metavar="LOG...", parser=location, help="Recordings (MCAP) with odometry.")

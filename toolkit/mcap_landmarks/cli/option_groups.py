@@ -1,5 +1,6 @@
 """Options that verbs share, as dataclasses, and how a command takes them: typer knows single options only."""
 
+import contextlib
 import dataclasses
 import functools
 import inspect
@@ -126,6 +127,25 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
 
     taking.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     taking.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined] # inspect and typer look there
+    return taking
+
+
+def reading_logs(command: Callable[..., None]) -> Callable[..., None]:
+    """The same command with --lenient, which then holds for every log that it reads."""
+
+    @functools.wraps(command)
+    def taking(*given: object, lenient: bool = False, **named: object) -> None:
+        with contextlib.ExitStack() as stack:
+            if lenient:
+                from mcap_landmarks.recording.reader import reading_from_front
+
+                stack.enter_context(reading_from_front())
+            command(*given, **named)
+
+    parameters = inspect.signature(command).parameters.values()
+    lenient = Parameter("lenient", Parameter.KEYWORD_ONLY, default=False, annotation=options.Lenient)
+    taking.__annotations__ = {**command.__annotations__, "lenient": options.Lenient}
+    taking.__signature__ = inspect.Signature([*parameters, lenient])  # type: ignore[attr-defined] # as above
     return taking
 
 

@@ -122,6 +122,15 @@ Overwrite = Annotated[
     ),
 ]
 Force = Annotated[bool, typer.Option("--force", help="Run every stage anew, also where its results are there.")]
+Lenient = Annotated[
+    bool,
+    typer.Option(
+        "--lenient",
+        help="Take no index of an MCAP log at its word: read it from the front, record by record, as recover does. "
+        "Without this its index is used where the records prove it right, and the log is read from the front where "
+        "not.",
+    ),
+]
 ConfigFile = Annotated[
     Location | None, typer.Option("--config", parser=location, help="TOML file with one table per stage.")
 ]

@@ -8,6 +8,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, warn
+from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.locations import Location, location, size_of
 
 
@@ -19,6 +20,7 @@ class Show(StrEnum):
     ERRORS = "errors"
 
 
+@reading_logs
 def command(
     inputs: Annotated[
         list[Location],

@@ -6,7 +6,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, table
-from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, reading_logs
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from mcap_landmarks.runs.pipeline import LogRun
 
 
+@reading_logs
 def command(
     logs: Annotated[list[Location], typer.Argument(metavar="LOG...", parser=location, help="Recordings (MCAP).")],
     stages: Annotated[

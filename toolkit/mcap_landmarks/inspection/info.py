@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from mcap_landmarks.manifest import is_generated
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.networks.choice import choose_network
 from mcap_landmarks.progress import Watch
-from mcap_landmarks.recording.reader import Recording, open_recording
+from mcap_landmarks.recording.reader import Recording, open_recording, reading_from_front
 from mcap_landmarks.sources import Log
 
 TRUTH, RESULTS = "truth", "results"
@@ -75,6 +76,7 @@ class LogInfo:
     blocked: Mapping[str, tuple[str, ...]] = field(default_factory=dict, kw_only=True)
     hints: Mapping[str, str]
     losses: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = field(default=())
     findings: tuple[Finding, ...] | None = None
     network: str | None = None
 
@@ -95,11 +97,13 @@ def describe(place: Location, settings: Settings, watch: Watch | None = None) ->
     Raises:
         RecordingError: it cannot be read.
     """
-    with open_logs(place, settings) as logs:
+    # A check reads everything, so no index needs to be trusted.
+    with reading_from_front() if watch is not None else nullcontext(), open_logs(place, settings) as logs:
         described = []
         for log in logs:
-            if log.path.is_file() and len(log.parts) == 1 and isinstance(log.parts[0], McapLog):
-                with open_recording(log.path) as recording:  # also the channels that cannot be converted
+            first = log.parts[0] if log.parts else None
+            if log.path.is_file() and len(log.parts) == 1 and isinstance(first, McapLog):
+                with open_recording(log.path, known=first.index) as recording:  # also what cannot be converted
                     losses = [f"{log.path.name}: {loss}" for loss in recording.losses]
                     described.append(_describe(log, recording.profile, [recording], losses))
             else:
@@ -116,6 +120,9 @@ def _checked(log: OpenLog, info: LogInfo, watch: Watch) -> LogInfo:
         found = survey(log, info.roles, progress)
         found.clocks = clocks_of(log, info.roles, examined_odometry(found), found.log_frames())
     network, about_it = _network(log) if found.of("image") else (None, [])
+    for part in log.parts:
+        if isinstance(part, McapLog):
+            part.check_attachments()
     formats = [one for part in log.parts if isinstance(part, McapLog) for one in check_formats(part.recorded)]
     findings = (*formats, *about_it, *check(found))
     losses = dict.fromkeys([*info.losses, *(loss for part in log.parts for loss in part.losses)])
@@ -179,6 +186,7 @@ def _describe(log: OpenLog, profile: str, parts: Sequence[Log | Recording], loss
         {verb: lacks for verb, lacks in missing.items() if lacks},
         _hints(counts, roles),
         tuple(losses),
+        log.all_notes(),
     )
 
 

@@ -51,6 +51,10 @@ class OpenLog:
         """The topics of all parts that cannot be carried."""
         return [one for part in self.parts for one in part.left_out]
 
+    def all_notes(self) -> tuple[str, ...]:
+        """What is odd about the log or a part of it and costs nothing."""
+        return (*self.notes, *(note for part in self.parts for note in notes_of(part)))
+
     @property
     def start_ns(self) -> int | None:
         """Log time of the first message."""
@@ -111,19 +115,26 @@ def _messages_in(part: Log) -> int:
     return sum(entry.count for entry in part.channels) + sum(one.messages for one in part.left_out)
 
 
+def notes_of(part: Log) -> list[str]:
+    """What is odd about a part and costs nothing."""
+    return part.notes if isinstance(part, McapLog) else []
+
+
 class McapLog:
     """An MCAP file as part of a log. It is opened anew for each reading: a bag may have thousands of them.
 
     Messages of ROS 1 and of Foxglove's types become CDR, others are as they are. `recorded` are the channels as they
-    lie in the file.
+    lie in the file, `index` says where.
     """
 
     def __init__(self, file: McapFile) -> None:
         self._file = file
         with open_recording(file.path) as recording:
+            self.index = recording.index
             self.profile, self.metadata = recording.profile, recording.metadata
             self.start_ns, self.end_ns = recording.start_ns, recording.end_ns
             self.losses = [f"{file.path.name}: {loss}" for loss in recording.losses]
+            self.notes = [f"{file.path.name}: {note}" for note in recording.notes]
             self.recorded = tuple(recording.channels)
         self.about = (file.path.name, recorded_metadata(self.metadata))
         self.left_out: list[OmittedTopic] = []
@@ -138,7 +149,7 @@ class McapLog:
     def mounts(self) -> list["MountLog"]:
         """Where sensors are, of which only their messages tell."""
         found = []
-        with open_recording(self._file.path) as recording:
+        with open_recording(self._file.path, known=self.index) as recording:
             for entry, carried in zip(recording.channels, self._carried, strict=True):
                 mount = carried.mount if carried else None
                 first = next(recording.messages([entry.connection]), None) if mount else None
@@ -194,7 +205,7 @@ class McapLog:
         progress: Progress | None = None,
     ) -> Iterator[RawMessage]:
         """See `Log`."""
-        with open_recording(self._file.path) as recording:
+        with open_recording(self._file.path, known=self.index) as recording:
             wanted = {
                 entry.connection: carried
                 for entry, carried in zip(recording.channels, self._carried, strict=True)
@@ -211,11 +222,21 @@ class McapLog:
             for loss in recording.losses:
                 self._lose(loss)
 
+    def check_attachments(self) -> None:
+        """Read the file's attachments, to know of those that are damaged."""
+        with open_recording(self._file.path, known=self.index) as recording:
+            for _ in recording.attachments():
+                pass
+            for loss in recording.losses:
+                self._lose(loss)
+
     def copy_attachments(self, writer: RecordingWriter) -> None:
         """Carry the file's attachments over."""
-        with open_recording(self._file.path) as recording:
+        with open_recording(self._file.path, known=self.index) as recording:
             for attachment in recording.attachments():
                 writer.attach(attachment)
+            for loss in recording.losses:
+                self._lose(loss)
 
     def _lose(self, loss: str) -> None:
         loss = f"{self._file.path.name}: {loss}"

@@ -8,6 +8,7 @@ from mcap.exceptions import McapError
 
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.locations import Location, to_read
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.container import MAGIC, RECORD, Opcode, parse
 from mcap_landmarks.recording.rebuild_index import index_by_scanning
 from mcap_landmarks.recording.record_shapes import check_content
@@ -34,7 +35,7 @@ def open_stream(path: Location) -> BinaryIO:
         raise RecordingError(f"{path}: cannot be read ({error.strerror}); check the path") from error
 
 
-def index_of(path: Location, stream: BinaryIO, *, from_front: bool) -> Index:
+def index_of(path: Location, stream: BinaryIO, *, from_front: bool, progress: Progress | None = None) -> Index:
     """What a recording holds and where: from its summary, or by reading it from the front where that cannot be used.
 
     Raises:
@@ -55,9 +56,9 @@ def index_of(path: Location, stream: BinaryIO, *, from_front: bool) -> Index:
     except (EOFError, McapError, struct_error, ValueError, MemoryError, OverflowError):
         return _without_header(path, stream, size)
     if from_front:
-        return index_by_scanning(stream, size, header)
+        return index_by_scanning(stream, size, header, progress=progress)
     index = index_from_summary(stream, size, header, len(MAGIC) + RECORD.size + len(content))
-    return index_by_scanning(stream, size, header, index) if isinstance(index, str) else index
+    return index_by_scanning(stream, size, header, index, progress) if isinstance(index, str) else index
 
 
 def _without_header(path: Location, stream: BinaryIO, size: int) -> Index:

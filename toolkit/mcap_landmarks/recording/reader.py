@@ -43,18 +43,23 @@ def reading_from_front() -> Iterator[None]:
 
 @contextlib.contextmanager
 def open_recording(
-    path: Location, *, verify: bool = True, known: Index | None = None, from_front: bool = False
+    path: Location,
+    *,
+    verify: bool = True,
+    known: Index | None = None,
+    from_front: bool = False,
+    progress: Progress | None = None,
 ) -> Iterator["Recording"]:
     """An open recording; `verify` checks the CRC of every chunk that is read.
 
     `known` is its index from the last time that it was open. With `from_front` all of it is read to find out what it
-    holds; else its summary is taken at its word, where the records agree with that.
+    holds, and `progress` told the bytes; else its summary is taken at its word, where the records agree with that.
 
     Raises:
         RecordingError: there is no such file, or it is not an MCAP file.
     """
     with open_stream(path) as stream:
-        index = known or index_of(path, stream, from_front=from_front or _from_front.get())
+        index = known or index_of(path, stream, from_front=from_front or _from_front.get(), progress=progress)
         yield Recording(path, stream, index, verify=verify)
 
 

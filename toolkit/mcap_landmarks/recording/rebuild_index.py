@@ -6,6 +6,7 @@ from typing import BinaryIO
 from mcap import records
 from mcap.exceptions import McapError
 
+from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.container import LARGEST_CHUNK, MAGIC, MESSAGE_FIXED, RECORD, Opcode, parse
 from mcap_landmarks.recording.findings import Findings
@@ -18,13 +19,15 @@ from mcap_landmarks.recording.summary_index import Index, read_summary
 _PIECE = 1 << 20
 
 
-def index_by_scanning(stream: BinaryIO, size: int, header: records.Header, remark: str = "") -> Index:
+def index_by_scanning(
+    stream: BinaryIO, size: int, header: records.Header, remark: str = "", progress: Progress | None = None
+) -> Index:
     """Everything that is sound, from the front to the footer: behind what is damaged it goes on at the next record.
 
-    `remark` says why the summary was not used. The `damage` of the index is the account of it all.
+    `remark` says why the summary was not used; `progress` is told the bytes. The account is the `damage` of the index.
     """
     scanner = _Scanner(stream, size, header, remark)
-    scanner.run()
+    scanner.run(progress)
     return scanner.index
 
 
@@ -50,15 +53,18 @@ class _Scanner:
             Opcode.FOOTER: self._footer,
         }
 
-    def run(self) -> None:
+    def run(self, progress: Progress | None) -> None:
         offset = len(MAGIC)
         while offset < self._size and not self._found.is_finished:
+            begin = offset
             opcode, length = head_at(self._read, offset)
             if self._is_plausible(opcode, length, offset):
                 self._take(opcode, offset, length)
                 offset += RECORD.size + length
             else:
                 offset = self._damaged(opcode, offset, length)
+            if progress:
+                progress(offset - begin)
         self._loose.close()
         if self._found.is_finished and offset + len(MAGIC) < self._size:
             self._found.remarks.append(f"{self._size - offset - len(MAGIC)} bytes behind its end are no part of it")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from mcap_landmarks.config import effective
 from mcap_landmarks.errors import RecordingError, UsageError
-from mcap_landmarks.inspection.open_logs import McapLog, OpenLog
+from mcap_landmarks.inspection.open_logs import McapLog, OpenLog, notes_of
 from mcap_landmarks.manifest import CARRIED, RUN, Manifest, entry_text, file_hash, is_generated
 from mcap_landmarks.messages.qos import KEY
 from mcap_landmarks.moments import moment
@@ -18,6 +18,7 @@ from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.writer import ROS2, RecordingWriter, create_recording, profile_of
 from mcap_landmarks.runs.bag_record import bag_record, custom_data_of
+from mcap_landmarks.runs.loss_report import REPORT, loss_report
 from mcap_landmarks.runs.rosbag2_metadata import RECORD
 from mcap_landmarks.sources import OmittedTopic, Piece, definition_files, merge
 from mcap_landmarks.stage import Connection, RawMessage
@@ -56,6 +57,13 @@ class Converted:
     notes: list[str] = field(default_factory=list)
     left_out: list[OmittedTopic] = field(default_factory=list)
 
+    def told_losses(self) -> list[str]:
+        """All that is lost, in words."""
+        lost = [*self.losses, *(one.told for one in self.left_out)]
+        if self.lost and not lost:
+            lost.append(f"{self.lost} of {self.declared} declared messages could not be read")
+        return lost
+
 
 class Job:
     """One output on its way: the logs that are merged into it."""
@@ -68,9 +76,10 @@ class Job:
         patterns: Sequence[re.Pattern[str]],
         *,
         strict: bool = False,
+        verb: str = "convert",
     ) -> None:
         """Raises RecordingError: no topic can be carried, or with `strict` one cannot."""
-        self._target, self._logs, self._selection = target, logs, selection
+        self._target, self._logs, self._selection, self._verb = target, logs, selection, verb
         self._parts = [part for log in logs for part in log.parts]
         self._declared: Counter[Connection] = Counter()
 
@@ -106,7 +115,8 @@ class Job:
         Raises:
             RecordingError: no message can be read, or the output cannot be written.
         """
-        done = Converted(self._target, left_out=self._left_out)
+        notes = [note for part in self._parts for note in notes_of(part)]
+        done = Converted(self._target, notes=notes, left_out=self._left_out)
         for log in self._logs:
             done.dropped.update(log.dropped)
             done.notes.extend(log.notes)
@@ -128,6 +138,8 @@ class Job:
                 done.notes.append(carried_note(on_topics))
                 writer.metadata[RUN][CARRIED] = entry_text(on_topics)
             self._account(done, counts, len(carried))
+            if lost := done.told_losses():
+                writer.metadata[REPORT] = loss_report(done.declared, done.topics.total(), lost)
         return done
 
     def _carry_over(
@@ -212,7 +224,7 @@ class Job:
             if isinstance(part, McapLog):
                 carried.update({name: entries for name, entries in part.metadata.items() if name not in _LOST_WITH})
         manifest = Manifest(
-            verb="convert",
+            verb=self._verb,
             config={log.source: _set(log) for log in self._logs},
             inputs=tuple(hashes[log.path] for log in self._logs),
             options=self._selection.options(),

@@ -37,12 +37,14 @@ def convert(
     beside: Sequence[Location] = (),
     overwrite: bool = False,
     strict: bool = False,
+    verb: str = "convert",
 ) -> Conversion:
     """Convert the logs of some inputs: into the file `output`, merged by time, or one by one into that folder.
 
     A folder is meant where an input has several logs, or where several inputs meet an `output` without `.mcap`. What is
     there is replaced if it was converted from the same inputs, or if it is to be overwritten; what is read `beside` the
     inputs is not. With `strict` a log with a topic that cannot be carried is refused, instead of written without it.
+    `verb` is what the outputs say they were made by.
 
     Raises:
         ToolkitError: nothing could be converted; nothing is left behind.
@@ -59,12 +61,12 @@ def convert(
         check_apart(plan, [*inputs, *beside])
         hashes = {path: _content_hash(path, watch) for path in dict.fromkeys(log.path for log in logs)}
         for target, group in plan.items():
-            earlier = earlier_recording("convert", [hashes[log.path] for log in group])
+            earlier = earlier_recording(verb, [hashes[log.path] for log in group])
             try:
-                job = Job(target, group, selection, patterns, strict=strict)
+                job = Job(target, group, selection, patterns, strict=strict, verb=verb)
                 with (
                     output_to(target, (), earlier, overwrite=overwrite),
-                    watch(f"convert to {target.name}", sum(log.size_bytes for log in group)) as advance,
+                    watch(f"{verb} to {target.name}", sum(log.size_bytes for log in group)) as advance,
                 ):
                     conversion.outputs.append(job.run(hashes, advance))
             except ToolkitError as error:
