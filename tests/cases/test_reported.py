@@ -30,6 +30,8 @@ CASES = (
     "odom_twist_only",
     "odom_two_robots",
     "odom_zero_quaternion",
+    "onnx_nms_in_graph",
+    "onnx_v8_head",
     "ros1_in_mcap",
     "scan_in_degrees",
     "scan_in_mm",

@@ -140,6 +140,29 @@ def test_grey_and_deep_and_transparent_files() -> None:
     assert_same(rgb_from_message(CompressedImage(1, "camera", "png", flat)), expected("mono8"))
 
 
+@pytest.mark.parametrize("kind", ["bgr8; jpeg compressed bgr8", "rgb8; png compressed bgr8", "rgb8; png compressed"])
+def test_formats_of_image_transport(kind: str) -> None:
+    """The file's own colours count, whatever the encoding was that it was made of."""
+    data = cv2.imencode(".png", picture()[:, :, ::-1])[1].tobytes()
+    assert_same(rgb_from_message(CompressedImage(1, "camera", kind, data)), picture())
+
+
+@pytest.mark.parametrize("deep", [1, 257])
+def test_deep_grey_and_mosaics_in_files(deep: int) -> None:
+    """image_transport stores them as they are: a mosaic is a grey file."""
+    bits = 8 if deep == 1 else 16
+    kind = np.uint8 if deep == 1 else np.uint16
+    flat = cv2.imencode(".png", grey(picture()).astype(kind) * deep)[1].tobytes()
+    assert_same(rgb_from_message(CompressedImage(1, "camera", f"mono{bits}; png compressed ", flat)), expected("mono8"))
+    for name, pattern in BAYER.items():
+        raw = cv2.imencode(".png", mosaic(picture(), pattern).astype(kind) * deep)[1].tobytes()
+        message = CompressedImage(1, "camera", f"bayer_{name}{bits}; png compressed ", raw)
+        assert_same(rgb_from_message(message), picture())
+    colour = cv2.imencode(".png", picture()[:, :, ::-1])[1].tobytes()
+    made = CompressedImage(1, "camera", f"bayer_rggb{bits}; jpeg compressed bgr8", colour)
+    assert_same(rgb_from_message(made), picture())
+
+
 def refusal(message: Image | CompressedImage) -> str:
     with pytest.raises(MessageError) as error:
         rgb_from_message(message)
@@ -151,6 +174,7 @@ def test_damaged_files_are_refused() -> None:
     assert "cut short" in refusal(CompressedImage(1, "camera", "jpeg", data[:-200]))
     assert "no image" in refusal(CompressedImage(1, "camera", "jpeg", b"hello"))
     assert "empty" in refusal(CompressedImage(1, "camera", "jpeg", b""))
+    assert "of a video" in refusal(CompressedImage(1, "camera", "h264", b"\0\0\0\1"))
     assert "depth" in refusal(CompressedImage(1, "camera", "16UC1; compressedDepth png", data))
 
 
@@ -160,8 +184,9 @@ def test_rows_that_do_not_fit_are_refused() -> None:
     assert "rows of 100 bytes" in refusal(Image(1, "c", 32, 48, "rgb8", False, 100, rows.tobytes()))
     assert "0 x 0" in refusal(Image(1, "c", 0, 0, "rgb8", False, 0, b""))
     line = refusal(Image(1, "c", 32, 48, "32FC1", False, 192, bytes(32 * 192)))
-    assert "'32FC1' is no picture" in line
-    assert "bayer_rggb8" in line
+    assert "'32FC1' is no picture but depth" in line
+    assert "--image" in line
+    assert "bayer_rggb8" in refusal(Image(1, "c", 32, 48, "64FC2", False, 192, bytes(32 * 192)))
     assert "cannot be decoded" in refusal(image("nv21", rows_of("nv21", picture())[:, :47], size=(32, 47)))
 
 

@@ -106,9 +106,9 @@ def first_calibrated(recording: Readable, connection: Connection) -> RawMessage 
 
 def first_size(recording: Readable, connection: Connection) -> Size | None:
     """The size of the first images of a connection that can be read."""
-    for raw in islice(recording.messages([connection]), _FIRST):
+    for raw in islice(recording.messages([connection]), _FIRST if connection.read_as in IMAGES else 0):
         try:
-            size = image_size(decode(IMAGES[connection.message_type], raw.data))
+            size = image_size(decode(IMAGES[connection.read_as], raw.data))
         except MessageError:
             continue
         if size is not None:

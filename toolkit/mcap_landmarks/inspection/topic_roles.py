@@ -15,6 +15,7 @@ from mcap_landmarks.messages.poses import Odometry, PoseStamped
 from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.messages.video import CompressedVideo, TheoraPacket
 from mcap_landmarks.stage import Channel, Connection, Readable
 
 
@@ -39,9 +40,10 @@ class Role:
         return tuple(message.ROS_TYPE for message in (*self.messages, *self.others))
 
 
+_VIDEOS = (CompressedVideo, TheoraPacket)
 _OF_CAMERAS = (channels.CAMERA_IMAGE, channels.CAMERA_INFO)
 ROLES: Mapping[Channel[Message], Role] = {
-    channels.CAMERA_IMAGE: Role("image", "--image", (CompressedImage, Image)),
+    channels.CAMERA_IMAGE: Role("image", "--image", (CompressedImage, Image), _VIDEOS, instead=_VIDEOS),
     channels.CAMERA_INFO: Role("camera_info", "--remap", (CameraInfo,)),
     channels.SCAN: Role(
         "scan", "--scan", (LaserScan,), (PointCloud2, MultiEchoLaserScan), instead=(MultiEchoLaserScan,)

@@ -11,7 +11,7 @@ from mcap_landmarks.resources import resource
 RosObject = Any
 """A message, or a part of one, of the typestore: its classes are made at run time, so that no checker knows them."""
 
-OWN_PACKAGES = ("vision_msgs", "foxglove_msgs", "mcap_landmarks_msgs")
+OWN_PACKAGES = ("vision_msgs", "foxglove_msgs", "mcap_landmarks_msgs", "theora_image_transport")
 """Those whose definitions lie in schemas/."""
 _GROWING = ("mcap_landmarks_msgs",)  # the others are defined elsewhere, and stay as they are
 

@@ -16,8 +16,10 @@ from mcap_landmarks.channels import MAP, MAP_MARKERS, MAP_PATH, TF_STATIC, TRUTH
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import CONTENT, RUN, STAGE, entry_text
 from mcap_landmarks.messages.codec import Message, encode
+from mcap_landmarks.messages.images import CompressedImage, Image
 from mcap_landmarks.messages.qos import KEY, qos_profile
 from mcap_landmarks.messages.typestore import definition
+from mcap_landmarks.messages.video import CompressedVideo, TheoraPacket
 from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.chunk_copy import WholeChunk, compressed
 from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, serialize
@@ -30,7 +32,7 @@ CHUNK_NS = 5 * 10**9
 """Where a chunk ends: between 256 KiB and 4 MiB size hardly matters, and those that overlap for longer cost memory."""
 ROS2 = "ros2"
 """The profile of recordings whose messages are all of CDR, each with its definition."""
-_IMAGE_TYPES = frozenset({"sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"})
+_IMAGE_TYPES = frozenset(message.ROS_TYPE for message in (Image, CompressedImage, CompressedVideo, TheoraPacket))
 _LATCHED = frozenset(channel.topic for channel in (TF_STATIC, MAP, MAP_MARKERS, MAP_PATH, TRUTH_OBJECTS))
 
 

@@ -1,13 +1,16 @@
 """A log before a run: its own messages, apart from the results that stages left in it."""
 
+from collections.abc import Sequence
+
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.inspection.topic_roles import choose
 from mcap_landmarks.manifest import narrowed
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.moments import moment
-from mcap_landmarks.recording.layered_log import LayeredLog, own_layer, result_layers
+from mcap_landmarks.recording.layered_log import Layer, LayeredLog, own_layer, result_layers
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.runs.bundles import Span
+from mcap_landmarks.runs.screened_log import ScreenedLog, videos_of
 from mcap_landmarks.stage import Channel
 
 
@@ -25,10 +28,15 @@ class RecordedLog:
         self.own, self.results = own_layer(recording), result_layers(recording)
         self.fingerprint = narrowed(recording.fingerprint(), start_ns=span.start_ns, end_ns=span.end_ns)
         self.choice = span.choice
+        self._videos = videos_of(recording, span.choice)
 
     def without_results(self) -> LayeredLog:
         """Its own messages."""
-        return LayeredLog(self.path, [self.own])
+        return self.layered([self.own])
+
+    def layered(self, layers: Sequence[Layer]) -> LayeredLog:
+        """Some layers as a stage reads them."""
+        return ScreenedLog(self.path, layers, self._videos) if self._videos else LayeredLog(self.path, layers)
 
     def has(self, channel: Channel[Message]) -> bool:
         """Whether the recording has messages of its own for a channel.

@@ -118,7 +118,7 @@ class Session:
         """What a stage can read: the log, with the results that its record says it reads."""
         read = [self.results[name] for name in sorted(record.inputs) if name in self.results]
         topics = {entry.connection.topic for layer in read for entry in layer.channels}
-        return LayeredLog(self.log.path, [self.own_without(topics), *read])
+        return self.log.layered([self.own_without(topics), *read])
 
     def odometry(self) -> tuple[str, ExaminedOdometry, LogFrames] | None:
         """The topic of the log's odometry, what can be used of it, and the log's frames; None where there is none."""

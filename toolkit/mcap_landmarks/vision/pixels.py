@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.messages.images import CompressedImage, Image
+from mcap_landmarks.messages.video import codec_of
 
 Rgb = NDArray[np.uint8]
 """An image (H, W, 3), 8 bits each of red, green and blue."""
@@ -60,6 +61,8 @@ _ENCODINGS: Mapping[str, _Encoding] = {
     "nv21": _Encoding(1, 1, cv2.COLOR_YUV2RGB_NV21, rows=1.5),
     "nv24": _Encoding(1, 1, cv2.COLOR_YUV2RGB_NV12, rows=3.0),
 }
+_DEPTH = ("32FC1", "64FC1")
+"""Encodings of distances: REP 118 has the first."""
 ENCODINGS = tuple(sorted(_ENCODINGS))
 """The encodings of `sensor_msgs/Image` that can be read; generic ones (`8UC3`) count as OpenCV's BGR."""
 
@@ -80,19 +83,29 @@ def _from_file(message: CompressedImage) -> Rgb:
     data = message.data
     if "compressedDepth" in message.format:
         raise MessageError(f"{message.format!r} is a depth image; choose a colour topic with --image")
+    if codec_of(message.format):
+        raise MessageError(f"{message.format!r} is a packet of a video, no picture without those before it")
     if not data:
         raise MessageError("the image is empty")
     if data.startswith(_JPEG_START) and _JPEG_END not in data[-_TRAILER_BYTES:]:
         raise MessageError(f"the JPEG of {len(data)} bytes is cut short")
     # CameraInfo speaks of pixels as they are stored, so an orientation tag must not turn them.
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION)
+    mosaic = _ENCODINGS.get(message.format.partition(";")[0].strip())
+    mosaic = mosaic if message.format.startswith("bayer_") else None
+    kind = cv2.IMREAD_UNCHANGED if mosaic else cv2.IMREAD_COLOR_RGB | cv2.IMREAD_IGNORE_ORIENTATION
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), kind)
     if image is None:
         raise MessageError(f"{len(data)} bytes of format {message.format!r} are no image that OpenCV reads")
-    return np.asarray(image, np.uint8)
+    if mosaic is not None:  # image_transport stores what is no colour image as it is, in grey
+        conversion = mosaic.conversion if image.ndim == 2 else None
+        image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB if conversion is None else conversion)
+    return _in_8_bits(image)
 
 
 def _from_rows(message: Image) -> Rgb:
     encoding = _ENCODINGS.get(message.encoding)
+    if message.encoding in _DEPTH:
+        raise MessageError(f"encoding {message.encoding!r} is no picture but depth; choose a colour topic with --image")
     if encoding is None:
         raise MessageError(f"encoding {message.encoding!r} is no picture; readable are {', '.join(ENCODINGS)}")
     samples = _samples(message, encoding)
@@ -100,6 +113,10 @@ def _from_rows(message: Image) -> Rgb:
         samples = _nv12_from_nv24(samples, message.height_px)
     if encoding.conversion is not None:
         samples = cv2.cvtColor(samples, encoding.conversion)
+    return _in_8_bits(samples)
+
+
+def _in_8_bits(samples: NDArray[Any]) -> Rgb:
     if samples.dtype == np.uint16:
         samples = cv2.convertScaleAbs(samples, alpha=255 / 65535)
     return np.ascontiguousarray(samples, np.uint8)
