@@ -23,6 +23,7 @@ from mcap_landmarks.runs.replacing import check_apart, earlier_recording, output
 
 _ROSBAG2 = "rosbag2"
 """The metadata record that counts a bag's messages: it stays true only where none is lost."""
+_NO_CRC = "the format has no CRC: nothing verifies the messages beyond the definitions that they fit"
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,8 +119,10 @@ def _recover_bag(path: Path, target: Path, watch: Watch, *, overwrite: bool) -> 
         conversion = convert([path], target, Selection(), {}, watch, overwrite=overwrite, verb="recover")
     (done,) = conversion.outputs
     losses = done.told_losses()
-    damage = Damage(expected=done.declared, recovered=done.topics.total(), records=tuple(losses))
-    return Recovered(done.path, done.topics, damage, 0, 0, tuple(losses), tuple(done.notes))
+    expected = None if losses and not done.lost else done.declared  # what is damaged may not count itself
+    damage = Damage(expected=expected, recovered=done.topics.total(), records=tuple(losses))
+    notes = (*done.notes, *([_NO_CRC] if path.suffix in {".bag", ".db3"} else []))
+    return Recovered(done.path, done.topics, damage, 0, 0, tuple(losses), notes)
 
 
 def report(done: Recovered) -> dict[str, object]:

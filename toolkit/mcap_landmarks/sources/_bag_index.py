@@ -6,15 +6,20 @@ from typing import BinaryIO
 
 from mcap_landmarks.sources import _bag_container as container
 from mcap_landmarks.sources._bag_container import BagConnection, BagMessage, ChunkInfo, DamagedBagError
+from mcap_landmarks.sources._bag_resync import next_record
 
 
 @dataclass(slots=True)
 class BagIndex:
-    """Connections by id, chunks by time, and in words what is known to be lost."""
+    """Connections by id, chunks by time, and in words what is known to be lost.
+
+    `damaged_at` is where the last chunk begins that was scanned, if that is damaged.
+    """
 
     connections: dict[int, BagConnection] = field(default_factory=dict)
     chunks: list[ChunkInfo] = field(default_factory=list)
     losses: list[str] = field(default_factory=list)
+    damaged_at: int | None = None
 
     def counts(self) -> Counter[int]:
         """Declared messages by connection id."""
@@ -63,47 +68,89 @@ def _from_end(stream: BinaryIO, size: int, position: int, expected: tuple[int, .
             index.chunks.append(container.parse_chunk_info(header, data))
     if (len(index.connections), len(index.chunks)) != expected:
         raise DamagedBagError(f"it lists {len(index.chunks)} of {expected[1]} chunks")
-    if any(chunk.offset >= position for chunk in index.chunks):
-        raise DamagedBagError("it names places behind the chunks")
+    _check_places(stream, size, position, index)
     if not set(index.counts()) <= set(index.connections):
         raise DamagedBagError("it counts messages of connections that it does not list")
     return index
 
 
+def _check_places(stream: BinaryIO, size: int, position: int, index: BagIndex) -> None:
+    """Refuse an index that does not name chunks one after the other, all before `position`.
+
+    Raises:
+        DamagedBagError: as it says.
+    """
+    end = 0
+    for offset in sorted(chunk.offset for chunk in index.chunks):
+        if offset < end:
+            raise DamagedBagError("it names a chunk twice")
+        stream.seek(min(offset, size))
+        header, length = container.read_header(stream, size)
+        end = stream.tell() + length
+        if container.operation(header) != container.CHUNK or end > position:
+            raise DamagedBagError("it names places where no chunk is")
+
+
 def _by_scanning(stream: BinaryIO, size: int, offset: int) -> BagIndex:
-    """Chunks up to where the bag is cut or damaged; the counts are those of the index records behind each chunk."""
+    """All chunks that can be found; the counts are those of the index records behind each chunk.
+
+    Behind what is damaged it goes on at the next record: from where the last chunk begins, if that is damaged too, for
+    then its length may be wrong and hide others.
+    """
     index = BagIndex()
-    try:
-        while offset < size:
-            stream.seek(offset)
-            header, length = container.read_header(stream, size)
-            kind, start = container.operation(header), stream.tell()
-            if kind == container.CHUNK:
-                _scan_chunk(stream, size, offset, index)
-            elif kind == container.INDEX and index.chunks:
-                data = container.read_exactly(stream, length, size - start)
-                counts = index.chunks[-1].counts
-                for key, count in container.index_counts(header, data).items():
-                    counts[key] = max(counts.get(key, 0), count)
-            elif kind == container.CONNECTION:
-                data = container.read_exactly(stream, length, size - start)
-                key, connection = container.parse_connection(header, memoryview(data))
-                index.connections.setdefault(key, connection)
-            offset = start + length
-        if offset > size:
-            index.losses.append(f"the file is cut at byte {size}, within a chunk; what follows is lost")
-    except DamagedBagError as error:
-        index.losses.append(f"at byte {offset} of {size}: {error}; what follows is lost")
+    while offset < size:
+        try:
+            offset = _scan_record(stream, size, offset, index)
+        except DamagedBagError as error:
+            search = offset if index.damaged_at is None else index.damaged_at
+            found = next_record(stream, size, search + 1)
+            if found is None:
+                index.losses.append(f"at byte {offset} of {size}: {error}; what follows is lost")
+                return index
+            begin = min(offset, found)
+            index.losses.append(f"{found - begin} bytes passed over from byte {begin} to byte {found} ({error})")
+            index.damaged_at = None
+            offset = found
+    if offset > size:
+        index.losses.append(f"the file is cut at byte {size}, within a chunk; what follows is lost")
     return index
 
 
-def _scan_chunk(stream: BinaryIO, size: int, offset: int, index: BagIndex) -> None:
-    messages, connections, _ = read_chunk(stream, size, offset)
+def _scan_record(stream: BinaryIO, size: int, offset: int, index: BagIndex) -> int:
+    """Take the record at an offset; where it ends.
+
+    Raises:
+        DamagedBagError: there is none.
+    """
+    stream.seek(offset)
+    header, length = container.read_header(stream, size)
+    kind, start = container.operation(header), stream.tell()
+    if kind == container.CHUNK:
+        is_sound = _scan_chunk(stream, size, offset, index)
+        index.damaged_at = None if is_sound else offset
+        if not is_sound and start + length > size and next_record(stream, size, offset + 1) is not None:
+            raise DamagedBagError(f"a chunk claims {length} bytes")
+    elif kind == container.INDEX and index.chunks:
+        counts = index.chunks[-1].counts
+        data = container.read_exactly(stream, length, size - start)
+        for key, count in container.index_counts(header, data).items():
+            counts[key] = max(counts.get(key, 0), count)
+    elif kind == container.CONNECTION:
+        data = container.read_exactly(stream, length, size - start)
+        key, connection = container.parse_connection(header, memoryview(data))
+        index.connections.setdefault(key, connection)
+    return start + length
+
+
+def _scan_chunk(stream: BinaryIO, size: int, offset: int, index: BagIndex) -> bool:
+    """Take the chunk at an offset; whether it is sound."""
+    messages, connections, problem = read_chunk(stream, size, offset)
     for key, connection in connections.items():
         index.connections.setdefault(key, connection)
     counts = Counter(message.connection_id for message in messages)
     first, last = (messages[0].time_ns, messages[-1].time_ns) if messages else (0, 0)
     index.chunks.append(ChunkInfo(offset, first, last, dict(counts)))
+    return problem is None
 
 
 def read_chunk(

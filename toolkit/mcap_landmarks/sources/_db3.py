@@ -12,6 +12,7 @@ import zstandard
 
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.progress import Progress
+from mcap_landmarks.sources._db3_salvage import salvaged_rows
 from mcap_landmarks.sources._db3_topics import (
     Db3Topic,
     about_in,
@@ -129,14 +130,17 @@ class Db3Log:
             self._damaged(error)
             counts.clear()
             times = array("q")
-            for time_ns, _, topic in _by_row(database):
+            gaps: list[int] = []
+            for time_ns, _, topic in salvaged_rows(database, gaps.append):
                 counts[topic] += 1
                 times.append(time_ns)
+            if gaps:
+                self._lose(f"{counted(sum(gaps), 'row')} between readable ones cannot be read")
             self.start_ns, self.end_ns = min(times, default=None), max(times, default=None)
         return counts
 
     def _damaged(self, error: sqlite3.DatabaseError) -> None:
-        self._lose(f"it is cut or damaged ({error}); what lies before the damage was taken")
+        self._lose(f"it is cut or damaged ({error}); the rows that can be read before and behind the damage were taken")
 
     def _lose(self, text: str) -> None:
         text = f"{self._path.name}: {text}"
@@ -232,17 +236,9 @@ def _fetched(database: sqlite3.Connection, keys: Iterator[_Key]) -> Iterator[_Ro
             yield time_ns, row, found[0], found[1]
 
 
-def _by_row(database: sqlite3.Connection) -> Iterator[tuple[int, int, int]]:
-    """Time, row id and topic of the rows before the damage, in the order written."""
-    with contextlib.suppress(sqlite3.DatabaseError):
-        for time_ns, row, topic in database.execute("SELECT timestamp, rowid, topic_id FROM messages"):
-            if isinstance(time_ns, int) and isinstance(topic, int):
-                yield time_ns, row, topic
-
-
 def _salvaged(database: sqlite3.Connection, after: _Key, end_ns: int) -> Iterator[_Row]:
     times, rows = array("q"), array("q")
-    for time_ns, row, _ in _by_row(database):
+    for time_ns, row, _ in salvaged_rows(database, lambda _count: None):
         if after < (time_ns, row) and time_ns < end_ns:
             times.append(time_ns)
             rows.append(row)
