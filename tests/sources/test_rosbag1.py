@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 from mcap_landmarks.errors import RecordingError
-from mcap_landmarks.sources import Log, NoConfig, find_source
+from mcap_landmarks.sources import Log, find_source
+from mcap_landmarks.sources.rosbag1 import Rosbag1Config
 from mcap_landmarks.stage import RawMessage
 from rosbags.rosbag1 import Reader, Writer
 from rosbags.typesys import get_types_from_msg
@@ -16,7 +17,7 @@ SOURCE = find_source("rosbag1")
 
 
 def read(path: Path) -> tuple[list[RawMessage], Log]:
-    with SOURCE.open(path, NoConfig()) as logs:
+    with SOURCE.open(path, Rosbag1Config()) as logs:
         (log,) = logs
         (part,) = log.parts
         assert not isinstance(part, Path)
@@ -133,7 +134,7 @@ def test_a_definition_that_cannot_be_understood_stops_only_its_topic(tmp_path: P
         talk = writer.add_connection("/talk", "std_msgs/msg/String", typestore=ROS1)
         writer.write(odd, START_NS, b"")
         writer.write(talk, START_NS, b"\x02\x00\x00\x00ok")
-    with SOURCE.open(path, NoConfig()) as logs:
+    with SOURCE.open(path, Rosbag1Config()) as logs:
         log = logs[0].parts[0]
         assert [raw.connection.topic for raw in log.messages()] == ["/talk"]
         (odd_one,) = log.left_out
@@ -154,7 +155,7 @@ def test_a_definition_that_cannot_be_understood_stops_only_its_topic(tmp_path: P
 def test_what_is_no_bag_is_refused(tmp_path: Path, content: bytes, words: str) -> None:
     path = tmp_path / "a.bag"
     path.write_bytes(content)
-    with pytest.raises(RecordingError, match=words), SOURCE.open(path, NoConfig()):
+    with pytest.raises(RecordingError, match=words), SOURCE.open(path, Rosbag1Config()):
         pass
 
 
@@ -165,7 +166,7 @@ def test_an_encrypted_bag_is_refused(tmp_path: Path) -> None:
     field = b"\x0d\x00\x00\x00encryptor=aes"
     changed = data[:13] + struct.pack("<I", header_length + len(field)) + data[17 : 17 + header_length] + field
     path.write_bytes(changed + data[17 + header_length :])
-    with pytest.raises(RecordingError, match="encrypted"), SOURCE.open(path, NoConfig()):
+    with pytest.raises(RecordingError, match="encrypted"), SOURCE.open(path, Rosbag1Config()):
         pass
 
 

@@ -30,19 +30,23 @@ def command(
             help="Read everything, and tell what will go wrong and what to do; exit code 3 where something will.",
         ),
     ] = False,
+    distro: options.Distro = None,
+    definitions: options.Definitions = None,
     json: options.Json = False,
 ) -> None:
     """Show channels, times and roles of each PATH, and which verbs can use it or what they lack."""
     from mcap_landmarks.inspection.info import describe
 
-    logs = [log for path in paths for log in describe(path, {}, progress if check else None)]
+    settings: dict[str, dict[str, object]] = {}
+    options.add_definitions(settings, distro, definitions)
+    logs = [log for path in paths for log in describe(path, settings, progress if check else None)]
     if json:
         documents = [_document(log) for log in logs]
         say_json("info", documents[0] if len(documents) == 1 else {"logs": documents})
     else:
         _print(logs)
     _tell(logs)
-    if any(log.losses or log.problems for log in logs):
+    if any(log.losses or log.left_out or log.problems for log in logs):
         raise typer.Exit(PARTIAL)
 
 
@@ -50,6 +54,8 @@ def _tell(logs: "Sequence[LogInfo]") -> None:
     for log in logs:
         for note in log.notes:
             warn(f"note: {note}")
+        for topic in log.left_out:
+            warn(f"warning: {log.path}: cannot be converted: {topic.told}")
         for loss in log.losses:
             warn(f"warning: {loss}")
 
@@ -77,6 +83,7 @@ def _document(log: "LogInfo") -> dict[str, object]:
         "blocked": {verb: list(topics) for verb, topics in log.blocked.items()},
         "losses": list(log.losses),
         "notes": list(log.notes),
+        "left_out": [topic.entries() for topic in log.left_out],
         **({} if log.findings is None else {"findings": [dataclasses.asdict(finding) for finding in log.findings]}),
         **({} if log.findings is None else {"network": log.network}),
     }

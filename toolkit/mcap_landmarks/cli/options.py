@@ -163,5 +163,5 @@ def add_definitions(settings: dict[str, dict[str, object]], distro: str | None, 
     """Add to the settings where definitions come from that bags lack."""
     if distro:
         settings.setdefault("rosbag2", {})["distro"] = distro
-    if definitions:
-        settings.setdefault("rosbag2", {})["definitions"] = [str(path) for path in definitions]
+    for source in ("rosbag1", "rosbag2") if definitions else ():
+        settings.setdefault(source, {})["definitions"] = [str(path) for path in definitions or ()]

@@ -23,7 +23,7 @@ from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.networks.choice import choose_network
 from mcap_landmarks.progress import Watch
 from mcap_landmarks.recording.reader import Recording, open_recording, reading_from_front
-from mcap_landmarks.sources import Log
+from mcap_landmarks.sources import Log, OmittedTopic, together
 
 TRUTH, RESULTS = "truth", "results"
 _BY_TOPIC = {
@@ -59,9 +59,10 @@ class ChannelInfo:
 class LogInfo:
     """One log. `name` tells the logs of one path apart, `roles` are topics by role, `missing` roles by verb.
 
-    `blocked` are the verbs that have all roles and fail all the same, each with the topics of the problems.
-    `hints` tells for roles that are missing which topics could play them, and how to choose one. `network` is the one
-    that would look at its images, None where it has none or no network fits; it is told with the findings.
+    `blocked` are the verbs that have all roles and fail all the same, each with the topics of the problems. `left_out`
+    are topics that `convert` cannot carry; some are known only when all was read. `hints` tells for roles that are
+    missing which topics could play them, and how to choose one. `network` is the one that would look at its images,
+    None where it has none or no network fits; it is told with the findings.
     """
 
     path: Path
@@ -77,6 +78,7 @@ class LogInfo:
     hints: Mapping[str, str]
     losses: tuple[str, ...] = field(default=())
     notes: tuple[str, ...] = field(default=())
+    left_out: tuple[OmittedTopic, ...] = field(default=())
     findings: tuple[Finding, ...] | None = None
     network: str | None = None
 
@@ -101,6 +103,8 @@ def describe(place: Location, settings: Settings, watch: Watch | None = None) ->
     with reading_from_front() if watch is not None else nullcontext(), open_logs(place, settings) as logs:
         described = []
         for log in logs:
+            if watch is not None:
+                log.verify(lambda _topic: True)
             first = log.parts[0] if log.parts else None
             if log.path.is_file() and len(log.parts) == 1 and isinstance(first, McapLog):
                 with open_recording(log.path, known=first.index) as recording:  # also what cannot be converted
@@ -169,7 +173,7 @@ def _profile(log: OpenLog) -> str:
 
 
 def _describe(log: OpenLog, profile: str, parts: Sequence[Log | Recording], losses: Sequence[str]) -> LogInfo:
-    counts = _counts(parts)
+    counts, left_out = _counts(parts), together(log.left_out)
     seconds = (log.end_ns - log.start_ns) * 1e-9 if log.start_ns is not None and log.end_ns is not None else 0.0
     read = {(one.connection.topic, one.connection.read_as) for part in parts for one in part.channels if one.count}
     roles = _roles(sorted(read))
@@ -180,13 +184,14 @@ def _describe(log: OpenLog, profile: str, parts: Sequence[Log | Recording], loss
         profile,
         log.start_ns,
         log.end_ns,
-        _channels(counts, seconds, roles),
+        _channels(_counted(left_out) | counts, seconds, roles),
         {role: topics for role, topics in roles.items() if role != RESULTS},
         tuple(verb for verb, lacks in missing.items() if not lacks),
         {verb: lacks for verb, lacks in missing.items() if lacks},
         _hints(counts, roles),
         tuple(losses),
         log.all_notes(),
+        tuple(left_out),
     )
 
 
@@ -196,6 +201,13 @@ def _counts(parts: Sequence[Log | Recording]) -> Counter[tuple[str, str]]:
     for part in parts:
         for entry in part.channels:
             counts[entry.connection.topic, entry.connection.message_type] += entry.count
+    return counts
+
+
+def _counted(left_out: Sequence[OmittedTopic]) -> Counter[tuple[str, str]]:
+    counts: Counter[tuple[str, str]] = Counter()
+    for one in left_out:
+        counts[one.topic, one.message_type] += one.messages
     return counts
 
 

@@ -46,6 +46,11 @@ class OpenLog:
     dropped: Mapping[str, int] = field(default_factory=dict)
     told: tuple[tuple[str, BagDescription], ...] = ()
 
+    def verify(self, wanted: Callable[[str], bool]) -> None:
+        """See `Log`, of all parts."""
+        for part in self.parts:
+            part.verify(wanted)
+
     @property
     def left_out(self) -> list[OmittedTopic]:
         """The topics of all parts that cannot be carried."""

@@ -20,7 +20,7 @@ from mcap_landmarks.recording.writer import ROS2, RecordingWriter, create_record
 from mcap_landmarks.runs.bag_record import bag_record, custom_data_of
 from mcap_landmarks.runs.loss_report import REPORT, loss_report
 from mcap_landmarks.runs.rosbag2_metadata import RECORD
-from mcap_landmarks.sources import OmittedTopic, Piece, definition_files, merge
+from mcap_landmarks.sources import OmittedTopic, Piece, definition_files, merge, together
 from mcap_landmarks.stage import Connection, RawMessage
 
 _LOST_WITH = frozenset({RUN, RECORD})  # metadata records that would no longer be true
@@ -86,9 +86,9 @@ class Job:
         def wanted(topic: str) -> bool:
             return not patterns or any(pattern.fullmatch(topic) for pattern in patterns)
 
-        for part in self._parts:
-            part.verify(wanted)
-        self._left_out = _together(one for log in logs for one in log.left_out if wanted(one.topic))
+        for log in logs:
+            log.verify(wanted)
+        self._left_out = together(one for log in logs for one in log.left_out if wanted(one.topic))
         self._unified = self._unify(wanted)
         if self._left_out and (strict or not self._unified):
             reasons = "; ".join(one.told for one in self._left_out)
@@ -252,14 +252,6 @@ def _set(log: OpenLog) -> dict[str, object]:
     paths = [Path(path) for path in given if isinstance(path, str)] if isinstance(given, tuple) else []
     files = [file for path in paths for file in definition_files(path)]
     return {**entries, "definitions": sorted({file_hash(file) for file in files})} if files else entries
-
-
-def _together(topics: Iterable[OmittedTopic]) -> list[OmittedTopic]:
-    """Topics that several files leave out for one reason, each once."""
-    counts: Counter[tuple[str, str, str]] = Counter()
-    for one in topics:
-        counts[one.topic, one.message_type, one.reason] += one.messages
-    return [OmittedTopic(topic, type_, count, reason) for (topic, type_, reason), count in counts.items()]
 
 
 def _identity(connection: Connection) -> tuple[object, ...]:

@@ -14,11 +14,11 @@ from mcap_landmarks.sources._shape import (
     Carried,
     Log,
     McapFile,
-    NoConfig,
     OmittedTopic,
     Payload,
     Source,
     SourceLog,
+    together,
 )
 from mcap_landmarks.sources._verification import defined, settled
 
@@ -59,7 +59,6 @@ __all__ = [
     "Carried",
     "Log",
     "McapFile",
-    "NoConfig",
     "OmittedTopic",
     "Payload",
     "Piece",
@@ -74,4 +73,5 @@ __all__ = [
     "settled",
     "source_names",
     "source_of",
+    "together",
 ]

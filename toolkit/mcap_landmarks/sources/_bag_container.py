@@ -8,6 +8,8 @@ from typing import BinaryIO, NamedTuple
 
 import lz4.frame
 
+from mcap_landmarks.sources._definition_text import decoded
+
 MAGIC = b"#ROSBAG V2.0\n"
 MESSAGE, BAG, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7
 """The operations of records, as the rosbag format 2.0 numbers them (wiki.ros.org/Bags/Format/2.0)."""
@@ -44,6 +46,7 @@ class BagConnection:
     ros_type: str
     definition: str
     latched: bool
+    md5sum: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,8 +148,9 @@ def parse_connection(header: Header, data: memoryview) -> tuple[int, BagConnecti
     connection = BagConnection(
         field(header, b"topic").decode(errors="replace"),
         field(about, b"type").decode(errors="replace"),
-        about.get(b"message_definition", b"").decode(errors="replace"),
+        decoded(about.get(b"message_definition", b"")),
         about.get(b"latching") == b"1",
+        about.get(b"md5sum", b"").decode(errors="replace"),
     )
     return uint32(field(header, b"conn")), connection
 

@@ -1,5 +1,6 @@
 """Definitions that the user gives: .msg, .srv, .action and .idl, as they lie in the folders of ROS packages."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -15,6 +16,7 @@ from mcap_landmarks.sources._type_graph import Fields, MessageFields
 
 _SUFFIXES = (".msg", ".srv", ".action", ".idl")  # where a package has both, the .idl was made from the other
 _FOLDERS = {"msg", "srv", "action"}
+_DIRECTIVE = re.compile(r"(?m)^[ \t]*#.*$")  # what is included is found by its name
 _MADE = ("_Request", "_Response", "_Event", "_Goal", "_Result", "_Feedback", "_FeedbackMessage")
 _LONGEST = 1 << 20
 """Bytes of the longest file that is read as a definition; those of ROS have at most some 20 KiB."""
@@ -60,6 +62,9 @@ class DefinitionFiles:
         return next((_types_in(file).get(name) for file in found.values()), None)
 
 
+NO_FILES = DefinitionFiles(())
+
+
 def _service(name: str) -> str:
     """The name of the service or action that makes a type."""
     for suffix in _MADE:
@@ -95,7 +100,8 @@ def _types_in(file: Path) -> _Types:
     text = decoded(file.read_bytes())
     try:
         if file.suffix == ".idl":
-            return {message_name(one): (made[0], _plainly(made[1])) for one, made in get_types_from_idl(text).items()}
+            types = get_types_from_idl(_DIRECTIVE.sub("", text))
+            return {message_name(one): (made[0], _plainly(made[1])) for one, made in types.items()}
         if file.suffix == ".msg":
             return dict(get_types_from_msg(plain(text), name))
         return service_types(name, text) if file.suffix == ".srv" else _action_types(name, text)

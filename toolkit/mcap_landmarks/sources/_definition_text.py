@@ -60,7 +60,7 @@ def _line(words: list[str], line: str) -> Iterator[str]:
     """A field or a constant; constants that the parser cannot take are left out, since messages do not hold them."""
     kind, rest = words[0], " ".join(words[1:])
     name, equals, value = rest.partition("=")
-    if not equals or " " in name.strip():  # a default value may hold the sign, too
+    if not equals or " " in name.strip() or not name.strip():  # a default value may hold the sign, too
         yield f"{kind} {name.split(' ')[0]}\n"
         return
     name, value = name.strip(), value.strip()

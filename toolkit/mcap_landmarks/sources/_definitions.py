@@ -23,11 +23,11 @@ class Definitions:
     """
 
     def __init__(self, files: DefinitionFiles, distributions: Sequence[str]) -> None:
-        self._files, self._distributions = files, tuple(dict.fromkeys(distributions))
+        self.files, self._distributions = files, tuple(dict.fromkeys(distributions))
 
     def also(self, distribution: str | None) -> "Definitions":
         """The same, and after them those of a distribution that a bag names."""
-        return Definitions(self._files, [*self._distributions, distribution]) if distribution else self
+        return Definitions(self.files, [*self._distributions, distribution]) if distribution else self
 
     def of(self, message_type: str) -> tuple[Definition, ...]:
         """The definitions that a type may have, each different; the first that fits all messages counts.
@@ -58,7 +58,7 @@ class Definitions:
         return _definition(message_type, types.get, "the file's", self._find)
 
     def _sources(self) -> Iterator[tuple[str, _Find]]:
-        yield "the given", self._files.fields
+        yield "the given", self.files.fields
         for distribution in self._distributions:
             yield f"{distribution}'s", partial(fields_in, distribution)
         yield "every distribution's", fields_of_all
@@ -79,7 +79,7 @@ class Definitions:
             )
         if there:
             return f"{text}, which {', '.join(there)} do; name one of them with --distro, or {remedy}"
-        return f"{text}, nor does what --definitions names; add it there" if self._files else f"{text}; {remedy}"
+        return f"{text}, nor does what --definitions names; add it there" if self.files else f"{text}; {remedy}"
 
 
 def _definition(message_type: str, find: _Find, origin: str, others: _Find) -> Definition:
@@ -98,6 +98,8 @@ def _definition(message_type: str, find: _Find, origin: str, others: _Find) -> D
         try:
             store.deserialize_cdr(data, name)
         except (SerdeError, struct_error, IndexError, ValueError, AssertionError) as error:
-            raise MessageError(f"{len(data)} bytes are not {origin} {message_type}: {error}") from error
+            raise MessageError(
+                f"{len(data)} bytes are not {origin} {message_type}: {str(error).rstrip('.')}"
+            ) from error
 
     return Definition(text, check)

@@ -31,7 +31,9 @@ def carry(definitions: Definitions, connection: Connection, records: Mapping[str
     if connection.message_encoding != "ros1" or encoding != "ros1msg":
         return Carried(replace(connection), lambda data: data)
     metadata = {KEY: qos_profile(latched=connection.metadata.get("latching") in {"1", "true"})}
-    type_ = converted(connection.message_type, decoded(connection.schema))
+    type_ = converted(
+        connection.message_type, decoded(connection.schema), connection.metadata.get("md5sum", ""), definitions.files
+    )
     return Carried(Connection(topic, type_.message_type, type_.definition.encode(), metadata=metadata), type_.convert)
 
 

@@ -1,13 +1,14 @@
 """ROS 1 messages to ROS 2's CDR: humble's type where the bag's fits into it, else the bag's own definition."""
 
-from collections.abc import Callable, Mapping
+import hashlib
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from struct import error as struct_error
 
 import numpy as np
 from rosbags.interfaces import Nodetype
-from rosbags.interfaces.typing import Constdefs
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.base import TypesysError
@@ -15,17 +16,19 @@ from rosbags.typesys.store import Typestore
 
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.messages.layout import FieldType
-from mcap_landmarks.messages.typestore import definition, typestore
+from mcap_landmarks.messages.typestore import definition, full_name, typestore
+from mcap_landmarks.sources._definition_files import NO_FILES, DefinitionFiles
+from mcap_landmarks.sources._definition_text import is_empty, plain
 from mcap_landmarks.sources._shape import Payload
+from mcap_landmarks.sources._type_graph import FILLER, MessageFields, Types, needed_by, nested_in
 
 Convert = Callable[[Payload], Payload]
-Fields = list[tuple[str, FieldType]]
-Types = Mapping[str, tuple[Constdefs, Fields]]
 
+_MD5 = re.compile(r"[0-9a-f]{32}")  # publishers that do not know their type write *
+_MD5_OF_NOTHING = hashlib.md5(b"", usedforsecurity=False).hexdigest()
 _RENAMED = {"tf/msg/tfMessage": "tf2_msgs/msg/TFMessage"}
 _HEADER = "std_msgs/msg/Header"
 _ONE_BYTE = {"byte", "char", "uint8"}
-_FILLER = "structure_needs_at_least_one_member"
 _NUMPY = {"bool": "bool_", "char": "uint8", "byte": "uint8"}
 
 
@@ -33,44 +36,77 @@ _NUMPY = {"bool": "bool_", "char": "uint8", "byte": "uint8"}
 class ConvertedType:
     """A ROS 1 type in ROS 2: its name, the text of its definition, and how its messages are converted.
 
-    `convert` raises MessageError for bytes that do not fit the bag's definition.
+    `convert` raises MessageError for bytes that do not fit the bag's definition. `is_sure` is false where that lacked
+    something that the standard types of ROS 1 had to fill in, and its checksum does not say that they are right.
     """
 
     message_type: str
     definition: str
     convert: Convert
+    is_sure: bool = True
+
+    def check(self, data: Payload) -> None:
+        """Convert for nothing but the MessageError."""
+        self.convert(data)
 
 
 @cache
-def converted(ros_type: str, text: str) -> ConvertedType:
-    """How a type of a bag is carried in ROS 2, from its ROS 1 name (`nav_msgs/Odometry`) and definition.
+def converted(ros_type: str, text: str, md5sum: str = "", files: DefinitionFiles = NO_FILES) -> ConvertedType:
+    """How a type of a bag is carried in ROS 2, from its ROS 1 name (`nav_msgs/Odometry`), definition and checksum.
 
-    A humble type takes over if it has every field of the bag's; fields that are new in humble get zeros.
+    What the definition lacks is taken from `files`, else from the standard types of ROS 1. A humble type takes over if
+    it has every field of the bag's; fields that are new in humble get zeros.
 
     Raises:
         MessageError: the definition cannot be understood.
     """
-    package, _, name = ros_type.partition("/")
-    source_name = f"{package}/msg/{name}"
+    source_name = full_name(ros_type)
     try:
-        source = get_typestore(Stores.EMPTY)
-        source.register(get_types_from_msg(text, source_name))
+        source, is_sure = _source(source_name, text, md5sum, files)
         target_name, target = _target(source.fielddefs, source_name)
-    except (TypesysError, KeyError) as error:
-        raise MessageError(f"the definition of {ros_type} cannot be understood: {error}") from error
+    except (MessageError, TypesysError, KeyError, ValueError, AssertionError, RecursionError, SyntaxError) as error:
+        why = (str(error).splitlines() or [type(error).__name__])[0]
+        raise MessageError(f"the definition of {ros_type} cannot be understood: {why}") from error
     humble = typestore().fielddefs
     own = target_name not in humble or target.fielddefs[target_name][1] != humble[target_name][1]
     schema = target.generate_msgdef(target_name, ros_version=2)[0] if own else definition(target_name)
     if _same_bytes(source.fielddefs, source_name, target.fielddefs, target_name):
         return ConvertedType(
-            target_name, schema, _guarded(lambda data: target.ros1_to_cdr(data, target_name), ros_type)
+            target_name, schema, _guarded(lambda data: target.ros1_to_cdr(data, target_name), ros_type), is_sure
         )
     migrate = _migration(source.fielddefs, source_name, target, target_name)
 
     def rewrite(data: Payload) -> Payload:
         return target.serialize_cdr(migrate(source.deserialize_ros1(data, source_name)), target_name)
 
-    return ConvertedType(target_name, schema, _guarded(rewrite, ros_type))
+    return ConvertedType(target_name, schema, _guarded(rewrite, ros_type), is_sure)
+
+
+def _source(name: str, text: str, md5sum: str, files: DefinitionFiles) -> tuple[Typestore, bool]:
+    """The types of a definition with all that they need, and whether nothing is doubtful in it.
+
+    Raises:
+        MessageError: it lacks what nobody defines, or is empty and was another one than that which is known.
+    """
+    standard = _standard().fielddefs
+
+    def known(one: str) -> MessageFields | None:
+        return files.fields(one) or standard.get(one)
+
+    empty = is_empty(text) and md5sum != _MD5_OF_NOTHING and (known(name) is not None or bool(md5sum))
+    given = {} if empty else get_types_from_msg(plain(text), name)
+    types = needed_by(name, lambda one: given.get(one) or known(one))
+    source = get_typestore(Stores.EMPTY)
+    source.register(types)
+    is_sure = types.keys() <= given.keys() or source.generate_msgdef(name, ros_version=1)[1] == md5sum
+    if empty and not is_sure and _MD5.fullmatch(md5sum):
+        raise MessageError("it is empty, and its checksum is another than that of the type of this name")
+    return source, is_sure
+
+
+@cache
+def _standard() -> Typestore:
+    return get_typestore(Stores.ROS1_NOETIC)
 
 
 def _guarded(convert: Convert, ros_type: str) -> Convert:
@@ -86,7 +122,7 @@ def _guarded(convert: Convert, ros_type: str) -> Convert:
 def _target(source: Types, source_name: str) -> tuple[str, Typestore]:
     """Name of the type in ROS 2, and a store with it and all that it needs."""
     humble = typestore().fielddefs
-    needed: dict[str, tuple[Constdefs, Fields]] = {}
+    needed: dict[str, MessageFields] = {}
 
     def take(name: str) -> str:
         new = _RENAMED.get(name, name)
@@ -95,7 +131,7 @@ def _target(source: Types, source_name: str) -> tuple[str, Typestore]:
         elif name not in needed:
             needed[name] = source[name]
             fields = [(field, _renamed(kind, take)) for field, kind in source[name][1]]
-            needed[name] = source[name][0], fields or [(_FILLER, (Nodetype.BASE, ("uint8", 0)))]
+            needed[name] = source[name][0], fields or [(FILLER, (Nodetype.BASE, ("uint8", 0)))]
             return name
         return new
 
@@ -105,18 +141,12 @@ def _target(source: Types, source_name: str) -> tuple[str, Typestore]:
     return target_name, target
 
 
-def _copy(types: Types, name: str, into: dict[str, tuple[Constdefs, Fields]]) -> None:
+def _copy(types: Types, name: str, into: dict[str, MessageFields]) -> None:
     if name not in into:
         into[name] = types[name]
         for _, kind in types[name][1]:
-            if nested := _nested(kind):
+            if nested := nested_in(kind):
                 _copy(types, nested, into)
-
-
-def _nested(kind: FieldType) -> str | None:
-    """Name of the message type in a field, None if it holds numbers or text."""
-    inner = kind[1][0] if kind[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE} else kind
-    return str(inner[1]) if inner[0] == Nodetype.NAME else None
 
 
 def _renamed(kind: FieldType, take: Callable[[str], str]) -> FieldType:
@@ -149,10 +179,10 @@ def _kind_fits(source: Types, kind: FieldType, target: Types, place: FieldType) 
 def _same_bytes(source: Types, source_name: str, target: Types, target_name: str) -> bool:
     """Whether the fields follow each other equally, the header's `seq` apart, which CDR leaves out."""
     have = [(name, kind) for name, kind in source[source_name][1] if (source_name, name) != (_HEADER, "seq")]
-    want = [(name, kind) for name, kind in target[target_name][1] if name != _FILLER]
+    want = [(name, kind) for name, kind in target[target_name][1] if name != FILLER]
     if [name.lower() for name, _ in have] != [name.lower() for name, _ in want]:
         return False
-    pairs = [(_nested(kind), _nested(place)) for (_, kind), (_, place) in zip(have, want, strict=True)]
+    pairs = [(nested_in(kind), nested_in(place)) for (_, kind), (_, place) in zip(have, want, strict=True)]
     return all(_same_bytes(source, a, target, b) for a, b in pairs if a and b)
 
 
@@ -173,7 +203,7 @@ def _field_migration(
     source: Types, field: tuple[str, FieldType], target: Typestore, place: FieldType
 ) -> Callable[[object], object]:
     name, kind = field
-    nested, wanted = _nested(kind), _nested(place)
+    nested, wanted = nested_in(kind), nested_in(place)
     if nested is None or wanted is None:
         return lambda message: getattr(message, name)
     migrate = _migration(source, nested, target, wanted)

@@ -1,6 +1,7 @@
 """The shape of a source: how it is recognised and opened, and what the logs that it gives offer."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -31,6 +32,14 @@ class OmittedTopic:
     def entries(self) -> dict[str, object]:
         """As --json prints it."""
         return {"topic": self.topic, "type": self.message_type, "messages": self.messages, "reason": self.reason}
+
+
+def together(topics: Iterable[OmittedTopic]) -> list[OmittedTopic]:
+    """Topics that several files leave out for one reason, each once."""
+    counts: Counter[tuple[str, str, str]] = Counter()
+    for one in topics:
+        counts[one.topic, one.message_type, one.reason] += one.messages
+    return [OmittedTopic(topic, type_, count, reason) for (topic, type_, reason), count in counts.items()]
 
 
 class Log(Protocol):
@@ -164,8 +173,3 @@ class Source:
     config: type[Config]
     recognises: Callable[[Path], bool]
     open: Callable[[Path, Any], AbstractContextManager[Sequence[SourceLog]]]
-
-
-@dataclass(frozen=True, slots=True)
-class NoConfig:
-    """The configuration of a source that has none."""

@@ -3,6 +3,7 @@
 import contextlib
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -12,11 +13,20 @@ from mcap_landmarks.messages.typestore import full_name
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.sources._bag_container import MAGIC, BagConnection, BagMessage, ChunkInfo, DamagedBagError
 from mcap_landmarks.sources._bag_index import BagIndex, read_chunk, read_index
+from mcap_landmarks.sources._definition_files import DefinitionFiles
 from mcap_landmarks.sources._merge import merge
 from mcap_landmarks.sources._ros1_types import Convert, converted
-from mcap_landmarks.sources._shape import NoConfig, OmittedTopic, Source, SourceLog
+from mcap_landmarks.sources._shape import Definition, OmittedTopic, Payload, Source, SourceLog
+from mcap_landmarks.sources._verification import settled
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 from mcap_landmarks.wording import counted
+
+
+@dataclass(frozen=True, slots=True)
+class Rosbag1Config:
+    """definitions: files and folders with those of types that a bag does not define."""
+
+    definitions: tuple[str, ...] = ()
 
 
 def recognises(path: Path) -> bool:
@@ -28,13 +38,14 @@ def recognises(path: Path) -> bool:
 
 
 @contextlib.contextmanager
-def open_bag(path: Path, _config: NoConfig) -> Iterator[Sequence[SourceLog]]:
+def open_bag(path: Path, config: Rosbag1Config) -> Iterator[Sequence[SourceLog]]:
     """The one log of a bag.
 
     Raises:
         RecordingError: it is no bag of format 2.0, or is encrypted.
+        UsageError: there are no such definitions.
     """
-    size = path.stat().st_size
+    size, files = path.stat().st_size, DefinitionFiles(config.definitions)
     with path.open("rb") as stream:
         start = stream.read(len(MAGIC))
         if not start:
@@ -46,17 +57,19 @@ def open_bag(path: Path, _config: NoConfig) -> Iterator[Sequence[SourceLog]]:
             index = read_index(stream, size)
         except DamagedBagError as error:
             raise RecordingError(f"{path} cannot be read: {error}; copy or decrypt it again") from error
-    yield [SourceLog(path.stem, (BagLog(path, size, index),), size)]
+    yield [SourceLog(path.stem, (BagLog(path, size, index, files),), size)]
 
 
 class BagLog:
     """The log in a bag. Connections that differ only in their publisher share one channel."""
 
-    def __init__(self, path: Path, size: int, index: BagIndex) -> None:
+    def __init__(self, path: Path, size: int, index: BagIndex, files: DefinitionFiles) -> None:
         self.losses = [f"{path.name}: {loss}" for loss in index.losses]
         self._path, self._size, self._chunks = path, size, [chunk for chunk in index.chunks if chunk.counts]
         self._known = frozenset(index.connections)
+        self._files = files
         self._carried: dict[int, tuple[Connection, Convert]] = {}
+        self._unsure: dict[Connection, list[Definition]] = {}
         self.left_out: list[OmittedTopic] = []
         self.channels = self._connect(index)
         self.start_ns = min((chunk.start_ns for chunk in self._chunks), default=None)
@@ -79,6 +92,21 @@ class BagLog:
 
     def verify(self, wanted: Callable[[str], bool]) -> None:
         """See `Log`."""
+        unsure = {one: self._unsure.pop(one) for one in list(self._unsure) if wanted(one.topic)}
+        for connection, found in settled(unsure, self._payloads).items():
+            if isinstance(found, str):
+                self._carried = {key: one for key, one in self._carried.items() if one[0] is not connection}
+                (entry,) = (entry for entry in self.channels if entry.connection is connection)
+                self.channels.remove(entry)
+                self.left_out.append(OmittedTopic(connection.topic, connection.message_type, entry.count, found))
+
+    def _payloads(self, connections: Collection[Connection]) -> Iterator[tuple[Connection, Payload]]:
+        """The messages of some connections as they lie in the bag."""
+        carried = {key: one for key, (one, _) in self._carried.items() if one in connections}
+        for chunk in self._chunks:
+            for _, key, data in self._checked(chunk, None):
+                if key in carried:
+                    yield carried[key], data
 
     def messages(
         self,
@@ -136,12 +164,17 @@ class BagLog:
     def _carry(self, described: BagConnection, count: int) -> tuple[Connection, Convert] | None:
         """What stands for a connection, and what converts its messages; None if nothing can."""
         try:
-            return _carried(described)
+            type_ = converted(described.ros_type, described.definition, described.md5sum, self._files)
         except MessageError as error:
             if count:
                 topic, ros_type = _topic(described.topic), full_name(described.ros_type)
                 self.left_out.append(OmittedTopic(topic, ros_type, count, str(error)))
             return None
+        text, metadata = type_.definition, {KEY: qos_profile(latched=described.latched)}
+        connection = Connection(_topic(described.topic), type_.message_type, text.encode(), metadata=metadata)
+        if not type_.is_sure:
+            self._unsure[connection] = [Definition(text, type_.check)]
+        return connection, type_.convert
 
     def _lose(self, text: str) -> None:
         text = f"{self._path.name}: {text}"
@@ -160,17 +193,4 @@ def _topic(name: str) -> str:
     return ("/" if name.startswith("/") else "") + "/".join(part for part in name.split("/") if part)
 
 
-def _carried(described: BagConnection) -> tuple[Connection, Convert]:
-    """The ROS 2 connection that stands for one of the bag, and what converts its messages.
-
-    Raises:
-        MessageError: the definition cannot be understood.
-    """
-    type_ = converted(described.ros_type, described.definition)
-    metadata = {KEY: qos_profile(latched=described.latched)}
-    return Connection(
-        _topic(described.topic), type_.message_type, type_.definition.encode(), metadata=metadata
-    ), type_.convert
-
-
-SOURCE = Source("rosbag1", "ROS 1 bags (.bag)", NoConfig, recognises, open_bag)
+SOURCE = Source("rosbag1", "ROS 1 bags (.bag)", Rosbag1Config, recognises, open_bag)
