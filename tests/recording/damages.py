@@ -203,6 +203,7 @@ DAMAGES: dict[str, tuple[dict[str, object], Damage]] = {
     "statistics": ({}, lambda data: put(data, of_kind(data, STATISTICS)[0].start + 9, b"\xff\xff\x01")),
     "channel in the summary": ({}, _record(CHANNEL, 4, -1)),
     "schema in the summary": ({}, _record(SCHEMA, 2, -1)),
+    "first bytes": ({}, lambda data: b"PK\x03\x04" + data[4:]),
     "loose messages, huge length": (
         {"chunked": False, "summary": False},
         lambda data: put(data, of_kind(data, MESSAGE)[500].start + 1, b"\xff" * 7 + b"\x7f"),
@@ -214,7 +215,7 @@ DAMAGES: dict[str, tuple[dict[str, object], Damage]] = {
     "loose messages, cut": ({"chunked": False}, _cut(0.6)),
     "0 bytes": ({}, lambda _data: b""),
     "magic only": ({}, lambda _data: MAGIC),
-    "not an MCAP": ({}, lambda data: b"PK\x03\x04" + data[4:]),
+    "not an MCAP": ({}, lambda data: b"PK\x03\x04" + data[4:-8]),
 }
 """What happens to a file, and how that was written."""
 

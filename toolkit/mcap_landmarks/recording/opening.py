@@ -45,7 +45,7 @@ def index_of(path: Location, stream: BinaryIO, *, from_front: bool, progress: Pr
     stream.seek(0)
     if size == 0:
         raise RecordingError(f"{path} is empty (0 bytes); record or copy it again")
-    if stream.read(len(MAGIC)) != MAGIC:
+    if not begins_or_ends(stream, size):
         raise RecordingError(f"{path} is not an MCAP file; mcap-landmarks convert reads bags and data sets")
     if size == len(MAGIC):
         raise RecordingError(f"{path} ends within its MCAP header; copy it again")
@@ -59,6 +59,15 @@ def index_of(path: Location, stream: BinaryIO, *, from_front: bool, progress: Pr
         return index_by_scanning(stream, size, header, progress=progress)
     index = index_from_summary(stream, size, header, len(MAGIC) + RECORD.size + len(content))
     return index_by_scanning(stream, size, header, index, progress) if isinstance(index, str) else index
+
+
+def begins_or_ends(stream: BinaryIO, size: int) -> bool:
+    """Whether a file begins with MCAP's magic bytes; or ends so: the first ones may be what is damaged."""
+    stream.seek(0)
+    if stream.read(len(MAGIC)) == MAGIC:
+        return True
+    stream.seek(max(size - len(MAGIC), 0))
+    return size > 2 * len(MAGIC) and stream.read(len(MAGIC)) == MAGIC
 
 
 def _without_header(path: Location, stream: BinaryIO, size: int) -> Index:

@@ -11,8 +11,8 @@ from mcap_landmarks.locations import Location, size_of, to_read
 from mcap_landmarks.manifest import RUN, Manifest, file_hash, is_generated
 from mcap_landmarks.progress import Progress, Watch
 from mcap_landmarks.recording.chunk_copy import WholeChunk
-from mcap_landmarks.recording.container import MAGIC
 from mcap_landmarks.recording.damage import Damage
+from mcap_landmarks.recording.opening import begins_or_ends
 from mcap_landmarks.recording.reader import Recording, open_recording, reading_from_front
 from mcap_landmarks.recording.writer import RecordingWriter, create_recording
 from mcap_landmarks.runs.conversion import Selection
@@ -56,10 +56,9 @@ def recover(place: Location, output: Location, watch: Watch, *, overwrite: bool 
 def _is_mcap(path: Path) -> bool:
     try:
         with path.open("rb") as stream:
-            start = stream.read(len(MAGIC))
+            return begins_or_ends(stream, path.stat().st_size)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror}); check the path") from error
-    return start == MAGIC
 
 
 def _recover_mcap(path: Path, target: Path, watch: Watch, *, overwrite: bool) -> Recovered:
