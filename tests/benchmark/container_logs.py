@@ -20,7 +20,6 @@ from rosbags.interfaces import Connection as BagConnection
 from rosbags.rosbag1 import Writer as BagWriter
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as FolderWriter
-from rosbags.typesys import Stores, get_typestore
 
 START_NS = 1_700_000_000 * 10**9
 _IMAGE_BYTES, _BEAMS = 200_000, 360
@@ -109,14 +108,14 @@ def write_mcap(path: Path, messages: Iterable[RawMessage], compression: Compress
 
 def write_bag(path: Path, messages: Iterable[RawMessage]) -> Path:
     """Written by rosbags as a bag of ROS 1."""
-    noetic = get_typestore(Stores.ROS1_NOETIC)
+    humble = typestore()
     with BagWriter(path) as writer:
         known: dict[Connection, BagConnection] = {}
         for message in messages:
             on = message.connection
             if on not in known:
-                known[on] = writer.add_connection(on.topic, on.message_type, typestore=noetic)
-            writer.write(known[on], message.log_time_ns, noetic.cdr_to_ros1(message.data, on.message_type))
+                known[on] = writer.add_connection(on.topic, on.message_type, typestore=humble)
+            writer.write(known[on], message.log_time_ns, humble.cdr_to_ros1(message.data, on.message_type))
     return path
 
 

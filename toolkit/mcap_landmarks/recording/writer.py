@@ -2,9 +2,11 @@
 
 import contextlib
 import hashlib
+import sys
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from struct import Struct
 from typing import BinaryIO
 
 import lz4.frame
@@ -32,7 +34,12 @@ CHUNK_NS = 5 * 10**9
 """Where a chunk ends: between 256 KiB and 4 MiB size hardly matters, and those that overlap for longer cost memory."""
 ROS2 = "ros2"
 """The profile of recordings whose messages are all of CDR, each with its definition."""
+_LENGTH, _LENGTH_8 = Struct("<I"), Struct("<Q")
+_INDEX = Struct("<BQHI")  # opcode, length, channel, bytes of the entries
+_MESSAGE_INDEX = Opcode.MESSAGE_INDEX.value
+_MESSAGE = Opcode.MESSAGE.value
 _IMAGE_TYPES = frozenset(message.ROS_TYPE for message in (Image, CompressedImage, CompressedVideo, TheoraPacket))
+_CLOUD_TYPE = "sensor_msgs/msg/PointCloud2"
 _LATCHED = frozenset(channel.topic for channel in (TF_STATIC, MAP, MAP_MARKERS, MAP_PATH, TRUTH_OBJECTS))
 
 
@@ -83,9 +90,10 @@ class _Chunk:
 class RecordingWriter:
     """Writes one recording to a stream; made by `create_recording`.
 
-    Every image channel gets uncompressed chunks of its own; the others share zstd chunks (lz4 in a passing recording),
-    results with those of their stage. A chunk ends after 1 MiB or 5 s. What `metadata` holds when the file is finished
-    goes into it, one record per name; a manifest with a fingerprint is bound to the content.
+    Every image channel gets uncompressed chunks of its own, every channel of clouds zstd chunks of its own (lz4 in a
+    passing recording); the others share such chunks, results with those of their stage. A chunk ends after 1 MiB or
+    5 s. What `metadata` holds when the file is finished goes into it, one record per name; a manifest with a
+    fingerprint is bound to the content.
     """
 
     def __init__(self, stream: BinaryIO, *, profile: str = ROS2, is_passing: bool = False) -> None:
@@ -123,31 +131,35 @@ class RecordingWriter:
         self._message_counts[channel_id] = 0
         self.counts.setdefault(connection.topic, 0)
         own = connection.metadata.get(STAGE, "")
-        group = f"image {channel_id}" if connection.message_type in _IMAGE_TYPES else own
+        group = own
+        if connection.message_type in _IMAGE_TYPES:
+            group = f"image {channel_id}"
+        elif connection.message_type == _CLOUD_TYPE and not own:
+            group = f"cloud {channel_id}"
         self._connections[connection] = (channel_id, group)
 
     def write(self, raw: RawMessage) -> None:
         """Write a message as it is, on the channel of its connection."""
-        if raw.connection not in self._connections:
-            self.declare(raw.connection)
-        channel_id, group = self._connections[raw.connection]
+        connection, time_ns, publish_time_ns, sequence, payload = raw
+        if connection not in self._connections:
+            self.declare(connection)
+        channel_id, group = self._connections[connection]
         chunk = self._chunks.get(group)
         if chunk is None:
             chunk = self._chunks[group] = _Chunk(compressed=not group.startswith("image "))
-        time_ns, size = raw.log_time_ns, len(raw.data)
+        data = chunk.data
         entries = chunk.index.get(channel_id)
         if entries is None:
             entries = chunk.index[channel_id] = array("Q")
-        entries.extend((time_ns, len(chunk.data)))
-        chunk.data += MESSAGE.pack(
-            Opcode.MESSAGE, MESSAGE_FIXED + size, channel_id, raw.sequence, time_ns, raw.publish_time_ns
-        )
-        chunk.data += raw.data
+        entries.append(time_ns)
+        entries.append(len(data))
+        data += MESSAGE.pack(_MESSAGE, MESSAGE_FIXED + len(payload), channel_id, sequence, time_ns, publish_time_ns)
+        data += payload
         chunk.start_ns = min(chunk.start_ns, time_ns)
         chunk.end_ns = max(chunk.end_ns, time_ns)
         self._message_counts[channel_id] += 1
-        self.counts[raw.connection.topic] += 1
-        if len(chunk.data) >= CHUNK_BYTES or chunk.end_ns - chunk.start_ns >= CHUNK_NS:
+        self.counts[connection.topic] += 1
+        if len(data) >= CHUNK_BYTES or chunk.end_ns - chunk.start_ns >= CHUNK_NS:
             for name in [key for key, other in self._chunks.items() if time_ns - other.start_ns >= CHUNK_NS]:
                 self._flush(self._chunks.pop(name))
             if group in self._chunks:
@@ -239,20 +251,18 @@ class RecordingWriter:
         return self._declared
 
     def _flush(self, chunk: _Chunk) -> None:
-        content = self._compress(bytes(chunk.data)) if chunk.compressed else bytes(chunk.data)
-        record = records.Chunk(
-            compression=self._compression if chunk.compressed else "",
-            data=content,
-            message_start_time=chunk.start_ns,
-            message_end_time=chunk.end_ns,
-            uncompressed_crc=crc32(chunk.data),
-            uncompressed_size=len(chunk.data),
-        )
+        content = self._compress(chunk.data) if chunk.compressed else chunk.data
+        compression = self._compression.encode() if chunk.compressed else b""
+        head = CHUNK.pack(chunk.start_ns, chunk.end_ns, len(chunk.data), crc32(chunk.data))
+        head += _LENGTH.pack(len(compression)) + compression + _LENGTH_8.pack(len(content))
+        record = b"".join((RECORD.pack(Opcode.CHUNK, len(head) + len(content)), head, content))
         indexes = {}
         for channel_id, entries in sorted(chunk.index.items()):
-            pairs = list(zip(entries[::2], entries[1::2], strict=True))
-            indexes[channel_id] = serialize(records.MessageIndex(channel_id=channel_id, records=pairs))
-        self._put_chunk(serialize(record), indexes)
+            if sys.byteorder == "big":
+                entries.byteswap()
+            content = entries.tobytes()
+            indexes[channel_id] = _INDEX.pack(_MESSAGE_INDEX, 6 + len(content), channel_id, len(content)) + content
+        self._put_chunk(record, indexes)
 
     def _put_chunk(self, record: bytes, indexes: Mapping[int, bytes]) -> None:
         """Write the whole record of a chunk and those of its message indexes, by channel."""

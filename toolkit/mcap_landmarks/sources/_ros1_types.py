@@ -19,6 +19,7 @@ from mcap_landmarks.messages.layout import FieldType
 from mcap_landmarks.messages.typestore import definition, full_name, typestore
 from mcap_landmarks.sources._definition_files import NO_FILES, DefinitionFiles
 from mcap_landmarks.sources._definition_text import is_empty, plain
+from mcap_landmarks.sources._ros1_copy import copier
 from mcap_landmarks.sources._shape import Payload
 from mcap_landmarks.sources._type_graph import FILLER, MessageFields, Types, needed_by, nested_in
 
@@ -71,9 +72,7 @@ def converted(ros_type: str, text: str, md5sum: str = "", files: DefinitionFiles
     own = target_name not in humble or target.fielddefs[target_name][1] != humble[target_name][1]
     schema = target.generate_msgdef(target_name, ros_version=2)[0] if own else definition(target_name)
     if _same_bytes(source.fielddefs, source_name, target.fielddefs, target_name):
-        return ConvertedType(
-            target_name, schema, _guarded(lambda data: target.ros1_to_cdr(data, target_name), ros_type), is_sure
-        )
+        return ConvertedType(target_name, schema, _guarded(_copying(target, target_name), ros_type), is_sure)
     migrate = _migration(source.fielddefs, source_name, target, target_name)
 
     def rewrite(data: Payload) -> Payload:
@@ -107,6 +106,19 @@ def _source(name: str, text: str, md5sum: str, files: DefinitionFiles) -> tuple[
 @cache
 def _standard() -> Typestore:
     return get_typestore(Stores.ROS1_NOETIC)
+
+
+def _copying(target: Typestore, name: str) -> Convert:
+    """What copies bytes where that is all it takes; rosbags says what is wrong with those that do not fit."""
+    copy = copier(target.fielddefs, name)
+    if copy is None:
+        return lambda data: target.ros1_to_cdr(data, name)
+
+    def copied(data: Payload) -> Payload:
+        found = copy(data)
+        return target.ros1_to_cdr(data, name) if found is None else found
+
+    return copied
 
 
 def _guarded(convert: Convert, ros_type: str) -> Convert:
