@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from mcap.reader import make_reader
+from mcap_landmarks.inspection.info import describe
 from mcap_landmarks.messages.typestore import RosObject, typestore
 from mcap_landmarks.runs.conversion import Converted
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -214,6 +215,8 @@ class TestScansWithAPose:
             summary = make_reader(stream).get_summary()
         assert summary is not None
         assert len(summary.channels) == 2
+        (info,) = describe(tmp_path / "in.mcap", {})
+        assert [one.message_type for one in info.channels] == ["foxglove.LaserScan", "foxglove.FrameTransforms"]
 
     def test_one_that_moves_is_told(self, tmp_path: Path) -> None:
         done, found = convert(tmp_path, of_json("/scan", "LaserScan", SCAN, {**SCAN, "pose": TURNED}, SCAN))

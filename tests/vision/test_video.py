@@ -123,6 +123,11 @@ def test_real_theora(shared_data: Path) -> None:
     assert {str(one) for one in run(every[5:9])} == {"the headers of the video did not come before it"}
 
 
+def test_pictures_that_are_too_large_are_not_decoded(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mcap_landmarks.vision.video._MOST_PIXELS", SIZE[0] * SIZE[1] - 1)
+    assert all(isinstance(one, MessageError) for one in decoded("h264", packets()))
+
+
 def test_without_pyav_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(RecordingError, match=r"h264 video .*pip install 'mcap-landmarks\[video\]'"):

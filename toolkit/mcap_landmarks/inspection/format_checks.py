@@ -1,11 +1,14 @@
 """Topics whose messages no stage reads as they are: of ROS 1, of other encodings, of types made or named otherwise."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from importlib.util import find_spec
 
 from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.messages.typestore import full_name
+from mcap_landmarks.messages.video import CompressedVideo, TheoraPacket
 from mcap_landmarks.sources import counterpart
 from mcap_landmarks.stage import ChannelSummary, Connection
+from mcap_landmarks.vision.video import INSTALL
 
 _CONVERT = "convert it first: mcap-landmarks convert LOG -o OUT.mcap"
 _SENSED = (
@@ -26,6 +29,15 @@ def check_formats(channels: Sequence[ChannelSummary]) -> Iterator[Finding]:
         elif not connection.schema:
             text = f"it has no definition of {connection.message_type}"
             yield Finding("warning", "format", connection.topic, text, "stages read it; other tools cannot")
+
+
+def check_videos(images: Collection[str], channels: Sequence[ChannelSummary]) -> Iterator[Finding]:
+    """Of the topics that are read as images, those with videos that cannot be decoded here."""
+    if find_spec("av") is None:
+        for connection in (entry.connection for entry in channels if entry.connection.topic in images):
+            if connection.read_as in {CompressedVideo.ROS_TYPE, TheoraPacket.ROS_TYPE}:
+                text = "it is a video, which is read with PyAV, and that is not installed"
+                yield Finding("problem", "image", connection.topic, text, INSTALL)
 
 
 def _name(connection: Connection) -> str:

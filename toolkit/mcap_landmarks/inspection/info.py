@@ -1,7 +1,7 @@
 """What a log holds: its channels, which roles they play, and which verbs can use it."""
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,7 +12,7 @@ from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.inspection.checks import check
 from mcap_landmarks.inspection.clock_reading import clocks_of
 from mcap_landmarks.inspection.finding import Finding
-from mcap_landmarks.inspection.format_checks import check_formats
+from mcap_landmarks.inspection.format_checks import check_formats, check_videos
 from mcap_landmarks.inspection.odometry_checks import examined_odometry
 from mcap_landmarks.inspection.open_logs import McapLog, OpenLog, open_logs
 from mcap_landmarks.inspection.survey import survey
@@ -105,8 +105,8 @@ def describe(place: Location, settings: Settings, watch: Watch | None = None) ->
         for log in logs:
             if watch is not None:
                 log.verify(lambda _topic: True)
-            first = log.parts[0] if log.parts else None
-            if log.path.is_file() and len(log.parts) == 1 and isinstance(first, McapLog):
+            first = log.only_file()
+            if first is not None:
                 with open_recording(log.path, known=first.index) as recording:  # also what cannot be converted
                     losses = [f"{log.path.name}: {loss}" for loss in recording.losses]
                     described.append(_describe(log, recording.profile, [recording], losses))
@@ -127,12 +127,17 @@ def _checked(log: OpenLog, info: LogInfo, watch: Watch) -> LogInfo:
     for part in log.parts:
         if isinstance(part, McapLog):
             part.check_attachments()
-    formats = [one for part in log.parts if isinstance(part, McapLog) for one in check_formats(part.recorded)]
-    findings = (*formats, *about_it, *check(found))
+    findings = (*_about_formats(log, info), *about_it, *check(found))
     losses = dict.fromkeys([*info.losses, *(loss for part in log.parts for loss in part.losses)])
     blocked = _blocked(info, findings)
     verbs = tuple(verb for verb in info.verbs if verb not in blocked)
     return replace(info, findings=findings, network=network, losses=tuple(losses), verbs=verbs, blocked=blocked)
+
+
+def _about_formats(log: OpenLog, info: LogInfo) -> Iterator[Finding]:
+    for part in log.parts:
+        yield from check_formats(part.recorded) if isinstance(part, McapLog) else ()
+        yield from check_videos(info.roles["image"], part.channels)
 
 
 def _blocked(info: LogInfo, findings: Sequence[Finding]) -> dict[str, tuple[str, ...]]:

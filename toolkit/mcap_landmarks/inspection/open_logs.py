@@ -56,6 +56,12 @@ class OpenLog:
         """The topics of all parts that cannot be carried."""
         return [one for part in self.parts for one in part.left_out]
 
+    def only_file(self) -> "McapLog | None":
+        """The MCAP file that the whole log is, None where it is a folder or of another format."""
+        found = [part for part in self.parts if not isinstance(part, MountLog)]
+        first = found[0] if len(found) == 1 and self.path.is_file() else None
+        return first if isinstance(first, McapLog) else None
+
     def all_notes(self) -> tuple[str, ...]:
         """What is odd about the log or a part of it and costs nothing."""
         return (*self.notes, *(note for part in self.parts for note in notes_of(part)))

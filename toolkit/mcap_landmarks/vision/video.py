@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 _MOST_WAITING = 32
 """A picture that has not come after so many packets never will: H.264 and H.265 hold back 16 pictures at most."""
+_MOST_PIXELS = 35_651_584
+"""The largest pictures that H.264, H.265 and AV1 have in their highest level (6.2); larger ones are not decoded."""
 _HEADERS = 3
 _FIRST_HEADER = 0x80
 _NO_KEY_FRAME, _NO_PICTURE = "no key frame came before it", "no picture came of it"
@@ -79,7 +81,7 @@ class VideoDecoder:
             codec: VideoCodecContext = self._av.CodecContext.create(codec_of(self._form), "r")
         except ValueError as error:
             raise RecordingError(f"{self._form} video is not read by this PyAV; {INSTALL}") from error
-        codec.thread_count = 1
+        codec.thread_count, codec.options = 1, {"max_pixels": str(_MOST_PIXELS)}
         if self._headers:  # each after its length, as FFmpeg has the headers of Xiph's codecs
             codec.extradata = b"".join(len(header).to_bytes(2, "big") + header for header in self._headers)
         return codec
