@@ -12,6 +12,7 @@ from mcap_landmarks.cli.main import build
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.resources import resource
 
+from tests.cli.calls import call
 from tests.sources.bags import write_mrclam, write_plain_db3, write_ros1, write_ros2
 
 SCHEMA: dict[str, Any] = json.loads(resource("schemas", "json/convert.schema.json").read_text())
@@ -160,3 +161,42 @@ def test_an_output_that_exists_is_replaced_whole_or_not_at_all(tmp_path: Path) -
     assert run(other, "-o", target, "--overwrite") == DONE
     with open_recording(target) as recording:
         assert sum(entry.count for entry in recording.channels) == 40
+
+
+def test_a_topic_that_nobody_understands_is_left_out_or_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    good = write_plain_db3(tmp_path / "good.db3")
+    own = [write_plain_db3(tmp_path / f"{name}.db3", message_type=f"my_msgs/msg/{name}") for name in ("One", "Two")]
+    target = tmp_path / "out.mcap"
+    found = document(capsys, good, *own, "-o", target, code=PARTIAL)
+    assert [one["type"] for one in found["left_out"]] == ["my_msgs/msg/One", "my_msgs/msg/Two"]
+    assert (found["declared"], found["read"], found["lost"]) == (60, 20, 40)
+    assert run(good, *own, "-o", target) == PARTIAL
+    assert "left out topic /talk (my_msgs/msg/Two), 20 messages: the file does not define" in capsys.readouterr().err
+    target.unlink()
+    code, line = refused(capsys, good, *own, "-o", target, "--strict")
+    assert code == UNUSABLE
+    assert all(f"topic /talk (my_msgs/msg/{name}), 20 messages" in line for name in ("One", "Two"))
+    assert not target.exists()
+
+
+def test_definitions_may_be_given(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write_plain_db3(tmp_path / "a.db3", message_type="my_msgs/msg/Words")
+    definition = tmp_path / "share" / "my_msgs" / "msg" / "Words.msg"
+    definition.parent.mkdir(parents=True)
+    definition.write_text("string data\n")
+    given = ("--definitions", tmp_path / "share")
+    assert run(source, "-o", tmp_path / "a.mcap", *given) == DONE
+    assert run(source, "-o", tmp_path / "b.mcap", "--definitions", definition, "--strict") == DONE
+    assert (tmp_path / "a.mcap").read_bytes() == (tmp_path / "b.mcap").read_bytes()  # no path is in it
+    capsys.readouterr()
+    assert call("info", source, "--check", *given) == DONE
+    assert "cannot be converted" not in capsys.readouterr().err
+    assert call("info", source, "--json") == PARTIAL
+    (topic,) = json.loads(capsys.readouterr().out)["left_out"]
+    assert (topic["topic"], topic["messages"]) == ("/talk", 20)
+    definition.write_text("int64 data\n")
+    assert run(source, "-o", tmp_path / "c.mcap", *given) == UNUSABLE
+    assert "are not the given my_msgs/msg/Words" in capsys.readouterr().err
+    assert run(source, "-o", tmp_path / "c.mcap", "--definitions", tmp_path / "none") == USAGE

@@ -106,7 +106,7 @@ def _opened(path: Path, source: str, config: Config, log: SourceLog) -> OpenLog:
         except RecordingError as error:
             problems.append(error)
     if problems and not parts:
-        raise problems[0]
+        raise RecordingError("; ".join([*log.losses, *map(str, problems)]))
     recordings = [part for part in parts if isinstance(part, McapLog)]
     losses, held = (*log.losses, *map(str, problems)), sum(map(_messages_in, parts))
     notes = (*log.notes, *_told_counts(path, None if losses else log.messages, held))

@@ -55,11 +55,11 @@ class DefinitionFiles:
         files = [file for file in self._files.get(name, ()) if _is_message(file)]
         files = files or [file for file in self._files.get(_service(name), ()) if not _is_message(file)]
         best = min((_SUFFIXES.index(file.suffix) for file in files), default=0)
-        found = {file.read_bytes(): file for file in files if _SUFFIXES.index(file.suffix) == best}
+        found = {_content(file): file for file in files if _SUFFIXES.index(file.suffix) == best}
         if len(found) > 1:
             first, second, *_ = found.values()
             raise UsageError(f"--definitions: {first} and {second} define {name} differently; name one of them")
-        return next((_types_in(file).get(name) for file in found.values()), None)
+        return next((_types_in(file, content).get(name) for content, file in found.items()), None)
 
 
 NO_FILES = DefinitionFiles(())
@@ -92,12 +92,15 @@ def _type_of(file: Path) -> str:
     return f"{package.name}/msg/{file.stem}"
 
 
-@cache
-def _types_in(file: Path) -> _Types:
-    name = _type_of(file)
+def _content(file: Path) -> bytes:
     if file.stat().st_size > _LONGEST:
         raise MessageError(f"{file} is too long to be a definition")
-    text = decoded(file.read_bytes())
+    return file.read_bytes()
+
+
+@cache
+def _types_in(file: Path, content: bytes) -> _Types:
+    name, text = _type_of(file), decoded(content)
     try:
         if file.suffix == ".idl":
             types = get_types_from_idl(_DIRECTIVE.sub("", text))

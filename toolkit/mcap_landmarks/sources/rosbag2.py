@@ -70,7 +70,7 @@ def open_bag(path: Path, config: Rosbag2Config) -> Iterator[Sequence[SourceLog]]
                 continue
             size += plain.stat().st_size
         if not parts:
-            raise problems[0]
+            raise RecordingError("; ".join(map(str, problems)))
         losses = (*folder.losses, *map(str, problems))
         told = ((METADATA, folder.about), *(one.about for one in parts if isinstance(one, Db3Log)))
         notes = tuple(folder.notes)
