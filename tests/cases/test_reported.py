@@ -46,6 +46,7 @@ CASES = (
     "tf_static_300ms_late",
     "tf_static_at_the_end",
     "topic_two_types",
+    "zero_tail",
 )
 
 

@@ -11,6 +11,9 @@ from mcap_landmarks.recording.summary_index import MESSAGE_START, Block
 
 _HEAD = CHUNK.size + 4 + 4 + 8
 """Bytes of a chunk's fields before its data, with the longest name of a compression."""
+_PIECE = 1 << 20
+_FEWEST_ZEROS = 512
+"""Disks lose whole sectors, of 512 bytes or more; a sound chunk may end in fewer zeros."""
 
 
 class ScannedChunks:
@@ -37,8 +40,23 @@ class ScannedChunks:
             content = chunk_content(record, verify=True)
             self._fill(Block(offset, RECORD.size + length, 0, 0), content, is_verified=_crc(record) != 0)
         except DamagedBlockError as error:
-            if self._mend(offset, record) is None:
+            if self._mend(offset, record) is None and not self._take_before_zeros(offset, record):
                 self._suspect(offset, record, str(error))
+
+    def _take_before_zeros(self, offset: int, record: bytes) -> bool:
+        """A chunk whose end is zeros up to the end of the file, as a crash leaves it: it is cut where these begin."""
+        whole = record.rstrip(b"\0")
+        end = offset + RECORD.size + len(record)
+        is_rest_zero = all(not any(self._read(at, _PIECE)) for at in range(end, self._size, _PIECE))
+        if len(record) - len(whole) < _FEWEST_ZEROS or not is_rest_zero:
+            return False
+        self._found.cut_at(offset)
+        try:
+            content = cut_chunk_content(whole)
+            self._fill(Block(offset, RECORD.size + len(whole), 0, 0, is_cut=True), content, is_verified=False)
+        except DamagedBlockError:
+            return False
+        return True
 
     def take_message_index(self, offset: int, _length: int) -> None:
         """The index of a channel behind a chunk tells how many messages of it a suspect chunk should hold."""
