@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.geometry.se2 import Array
@@ -22,6 +21,8 @@ def rigid(translation_m: ArrayLike, rotation_xyzw: ArrayLike) -> Array:
     translation, quaternion = np.asarray(translation_m, dtype=np.float64), np.asarray(rotation_xyzw, dtype=np.float64)
     if not is_rigid(translation, quaternion):
         raise RecordingError(f"{translation.tolist()}, {quaternion.tolist()} is no rigid transform; {REMEDY}")
+    from scipy.spatial.transform import Rotation  # noqa: PLC0415 - takes a fifth of a second, and most verbs need none
+
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = Rotation.from_quat(quaternion).as_matrix(), translation
     return matrix

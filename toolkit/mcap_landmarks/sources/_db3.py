@@ -222,7 +222,9 @@ def _by_time(database: sqlite3.Connection, first_ns: int, end_ns: int) -> Iterat
     whole = f"SELECT timestamp, rowid, topic_id, data {within} {order}"
     plan = database.execute(f"EXPLAIN QUERY PLAN {whole}", (first_ns, end_ns)).fetchall()
     if not any("TEMP B-TREE" in row[3] for row in plan):
-        yield from map(tuple, database.execute(whole, (first_ns, end_ns)))
+        cursor = database.cursor()
+        cursor.row_factory = None  # plain tuples: names for the columns of each row take as long as reading it
+        yield from cursor.execute(whole, (first_ns, end_ns))
         return
     keys = database.execute(f"SELECT timestamp, rowid {within} {order}", (first_ns, end_ns))
     yield from _fetched(database, ((int(row[0]), int(row[1])) for row in keys))

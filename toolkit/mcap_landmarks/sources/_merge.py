@@ -30,6 +30,10 @@ def _drain(active: list[tuple[int, int, RawMessage, Iterator[RawMessage]]], unti
     while active and active[0][0] <= until_ns:
         _, order, message, messages = active[0]
         yield message
+        if len(active) == 1 and until_ns == _END:  # nothing is left to compare with
+            active.clear()
+            yield from messages
+            return
         following = next(messages, None)
         if following is None:
             heapq.heappop(active)
