@@ -4,8 +4,9 @@ from collections import Counter
 from pathlib import Path
 
 from mcap_landmarks.progress import unwatched
-from mcap_landmarks.runs.conversion import Converted, Selection
+from mcap_landmarks.runs.conversion import Converted
 from mcap_landmarks.runs.convert import Conversion, convert
+from mcap_landmarks.runs.topic_selection import Selection
 from pymcap_cli.doctor import Severity, examine_mcap
 from rosbags.rosbag2 import Reader as Reader2
 

@@ -10,7 +10,7 @@ from mcap.records import Attachment
 from mcap.writer import Writer as McapWriter
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.recording.reader import open_recording
-from mcap_landmarks.runs.conversion import Selection
+from mcap_landmarks.runs.topic_selection import Selection
 from rosbags.highlevel import AnyReader
 
 from tests.runs.conversion import doctor, one, run, stored

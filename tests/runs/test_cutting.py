@@ -20,10 +20,10 @@ from mcap_landmarks.recording.latched import latched
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.runs.bundles import Span
-from mcap_landmarks.runs.conversion import Selection
 from mcap_landmarks.runs.convert import convert
 from mcap_landmarks.runs.pipeline import LogRun, run_stages
 from mcap_landmarks.runs.plan import Request
+from mcap_landmarks.runs.topic_selection import Selection
 from mcap_landmarks.stage import Connection, RawMessage, Stamped
 
 from tests.maps.examples import small_map

@@ -8,8 +8,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.progress import unwatched
-from mcap_landmarks.runs.conversion import Selection
 from mcap_landmarks.runs.convert import convert
+from mcap_landmarks.runs.topic_selection import Selection
 
 from tests.sources.bags import write_plain_db3, write_ros1
 

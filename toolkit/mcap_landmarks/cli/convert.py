@@ -6,6 +6,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, warn
+from mcap_landmarks.cli.conversion_options import FormOptions, SelectionOptions
 from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.locations import Location, location
 from mcap_landmarks.wording import counted
@@ -24,11 +25,8 @@ def command(
         ),
     ],
     output: options.Output,
-    topics: Annotated[
-        list[str] | None, typer.Option("--topics", metavar="REGEX", help="Only topics that match whole; repeatable.")
-    ] = None,
-    start: options.Start = None,
-    end: options.End = None,
+    chosen: SelectionOptions,
+    shape: FormOptions,
     distro: options.Distro = None,
     definitions: options.Definitions = None,
     strict: Annotated[
@@ -45,14 +43,23 @@ def command(
     robots gives one file per robot, in a folder.
     """
     from mcap_landmarks.config import gather
-    from mcap_landmarks.runs.conversion import Selection
-    from mcap_landmarks.runs.convert import convert
+    from mcap_landmarks.runs.convert import OutputForm, convert
 
-    chosen = gather(config_file, settings or [], None)
-    options.add_definitions(chosen, distro, definitions)
-    selection = Selection(tuple(topics or ()), options.time_ns(start, "--start"), options.time_ns(end, "--end"))
+    given = gather(config_file, settings or [], None)
+    options.add_definitions(given, distro, definitions)
+    form = OutputForm(shape.split(), shape.form())
     beside = [config_file] if config_file else []
-    conversion = convert(inputs, output, selection, chosen, progress, beside=beside, overwrite=overwrite, strict=strict)
+    conversion = convert(
+        inputs,
+        output,
+        chosen.selection(),
+        given,
+        progress,
+        beside=beside,
+        overwrite=overwrite,
+        form=form,
+        strict=strict,
+    )
     for done in conversion.outputs:
         _report(done)
     for failure in conversion.failures:

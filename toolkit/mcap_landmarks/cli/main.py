@@ -13,7 +13,7 @@ from mcap_landmarks.cli.console import heeding_signals, run_command
 from mcap_landmarks.cli.option_groups import spread
 from mcap_landmarks.errors import UsageError
 
-_NOT_VERBS = {"__init__", "main", "console", "option_groups", "options", "stage_runs"}
+_NOT_VERBS = {"__init__", "main", "console", "option_groups", "options", "stage_runs", "conversion_options"}
 _HELP = "Landmark maps and positions from robot recordings, offline and without ROS."
 
 

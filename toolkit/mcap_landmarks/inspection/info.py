@@ -13,8 +13,9 @@ from mcap_landmarks.inspection.checks import check
 from mcap_landmarks.inspection.clock_reading import clocks_of
 from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.inspection.format_checks import check_formats, check_videos
+from mcap_landmarks.inspection.mcap_log import McapLog
 from mcap_landmarks.inspection.odometry_checks import examined_odometry
-from mcap_landmarks.inspection.open_logs import McapLog, OpenLog, open_logs
+from mcap_landmarks.inspection.open_logs import OpenLog, open_logs
 from mcap_landmarks.inspection.survey import survey
 from mcap_landmarks.inspection.topic_roles import ROLES, Role, could_be, topics_for
 from mcap_landmarks.locations import Location

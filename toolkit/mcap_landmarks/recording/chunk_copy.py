@@ -22,6 +22,9 @@ _ENTRY = np.dtype([("log", "<u8"), ("offset", "<u8")])
 _INDEX_HEAD = RECORD.size + 6
 """Bytes of a message index before its entries: opcode, length, channel id, and how many bytes the entries have."""
 
+_COMPRESSED = 0x28
+"""First byte of payloads that rosbag2 compressed one by one with zstd (RFC 8878), and does not mark in MCAP."""
+
 
 @dataclass(frozen=True, slots=True)
 class WholeChunk:
@@ -46,8 +49,8 @@ def read_whole(
 ) -> WholeChunk | None:
     """The chunk of a block as it may be copied to where its channels are declared with these ids, None if it may not.
 
-    Its CRC and its message indexes must be right, and every schema and channel in it be what is declared: otherwise its
-    messages have to be written anew.
+    Its CRC and its message indexes must be right, every schema and channel in it be what is declared, and no payload
+    be compressed by itself: otherwise its messages have to be written anew.
     """
     if not block.is_chunk or block.is_cut or block.head or not (block.channel_ids is None or block.channel_ids <= ids):
         return None
@@ -111,6 +114,9 @@ def _agrees(content: memoryview, entries: Mapping[int, NDArray[np.void]], declar
     is_message = (found["opcode"] == Opcode.MESSAGE) & (found["length"] >= MESSAGE_FIXED)
     is_indexed = (found["channel"] == channels) & (found["log"] == index["log"])
     if not (is_message & is_indexed & (found["length"] <= len(content))).all():
+        return False
+    payloads = starts[found["length"] > MESSAGE_FIXED] + MESSAGE.size
+    if (np.frombuffer(content, np.uint8)[np.minimum(payloads, len(content) - 1)] == _COMPRESSED).any():
         return False
     ends = np.append(0, starts + RECORD.size + found["length"].astype(np.int64))
     nexts = np.append(starts, len(content))

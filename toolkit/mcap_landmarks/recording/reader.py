@@ -80,6 +80,7 @@ class Recording:
         self._stream, self._verify = stream, verify
         self._lost_attachments: list[str] = []
         self._connections = {key: _connection(index, channel) for key, channel in sorted(index.channels.items())}
+        self._ids = {connection: key for key, connection in self._connections.items()}
         self.channels = tuple(
             ChannelSummary(connection, index.counts.get(key, 0)) for key, connection in self._connections.items()
         )
@@ -126,6 +127,15 @@ class Recording:
             else:
                 digest.update(self._stream.read(block.length))
         return digest.hexdigest()
+
+    def content_hash(self) -> str | None:
+        """A hash over all chunks, None if some content has no CRC to stand for it."""
+        for block in self.index.blocks:
+            if block.is_chunk:
+                self._stream.seek(block.offset + RECORD.size + CHUNK.size - 4)
+                if self._stream.read(4) == bytes(4):
+                    return None
+        return self._hash(is_foreign=False)
 
     def attachments(self) -> Iterator[records.Attachment]:
         """The attachments, whole, in the order of the file; those that are damaged are told in `losses`."""
@@ -184,9 +194,16 @@ class Recording:
                 push(active, number, self._load(block, wanted, progress), first, last)
         yield from chain.from_iterable(drain(active, 2**64))
 
+    def blocks(self, connections: Collection[Connection]) -> list[Block] | None:
+        """The blocks with messages of some connections, by their start; None if some hold messages of others, too."""
+        wanted = self._wanted(connections)
+        blocks = self._blocks(wanted, 0, 2**64)
+        is_known = all(block.channel_ids is not None and block.channel_ids <= wanted.keys() for block in blocks)
+        return blocks if is_known else None
+
     def ids(self, connection: Connection) -> tuple[int, int]:
         """The ids of a connection's channel and schema."""
-        channel_id = next(key for key, other in self._connections.items() if other is connection)
+        channel_id = self._ids[connection]
         return channel_id, self.index.channels[channel_id].schema_id
 
     def size_bytes(

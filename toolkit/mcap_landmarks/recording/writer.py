@@ -5,7 +5,6 @@ import hashlib
 import sys
 from array import array
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from struct import Struct
 from typing import BinaryIO
 
@@ -24,14 +23,12 @@ from mcap_landmarks.messages.typestore import definition
 from mcap_landmarks.messages.video import CompressedVideo, TheoraPacket
 from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.chunk_copy import WholeChunk, compressed
+from mcap_landmarks.recording.chunk_form import CHUNK_NS, ChunkForm, OpenChunk
 from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, serialize
 from mcap_landmarks.recording.declared_channels import Declared
 from mcap_landmarks.recording.summary import summary_section
 from mcap_landmarks.stage import Channel, Connection, RawMessage, Stamped
 
-CHUNK_BYTES = 1 << 20
-CHUNK_NS = 5 * 10**9
-"""Where a chunk ends: between 256 KiB and 4 MiB size hardly matters, and those that overlap for longer cost memory."""
 ROS2 = "ros2"
 """The profile of recordings whose messages are all of CDR, each with its definition."""
 _LENGTH, _LENGTH_8 = Struct("<I"), Struct("<Q")
@@ -59,32 +56,23 @@ def create_recording(
     *,
     profile: str = ROS2,
     is_passing: bool = False,
+    form: ChunkForm | None = None,
 ) -> Iterator["RecordingWriter"]:
     """A writer whose file takes the name `path` when the block ends well and vanishes when it does not.
 
     `profile` is that of the channels, see `profile_of`. One that `is_passing`, which is read once and removed, is
-    compressed in a quarter of the time, and less.
+    compressed in a quarter of the time, and less; `form` is how its chunks look otherwise.
 
     Raises:
         UsageError, RecordingError: the file cannot be written; nothing is left behind.
     """
     with atomic_file(path) as stream:
-        writer = RecordingWriter(stream, profile=profile, is_passing=is_passing)
+        form = form or ChunkForm("lz4" if is_passing else "zstd", is_for_images=False)
+        writer = RecordingWriter(stream, form, profile=profile)
         for name, entries in (metadata or {}).items():
             writer.metadata[name] = dict(entries)
         yield writer
         writer.finish()
-
-
-@dataclass(slots=True)
-class _Chunk:
-    """Messages on their way into one chunk of the file."""
-
-    compressed: bool
-    data: bytearray = field(default_factory=bytearray)
-    start_ns: int = 2**64 - 1
-    end_ns: int = 0
-    index: "dict[int, array[int]]" = field(default_factory=dict)
 
 
 class RecordingWriter:
@@ -96,7 +84,7 @@ class RecordingWriter:
     fingerprint is bound to the content.
     """
 
-    def __init__(self, stream: BinaryIO, *, profile: str = ROS2, is_passing: bool = False) -> None:
+    def __init__(self, stream: BinaryIO, form: ChunkForm, *, profile: str = ROS2) -> None:
         self.metadata: dict[str, dict[str, str]] = {}
         self.counts: dict[str, int] = {}
         self._stream = stream
@@ -105,12 +93,12 @@ class RecordingWriter:
         self._own: dict[tuple[str, str], Connection] = {}
         self._declared = Declared()
         self._message_counts: dict[int, int] = {}
-        self._chunks: dict[str, _Chunk] = {}
+        self._chunks: dict[str, OpenChunk] = {}
         self._chunk_indexes: list[records.ChunkIndex] = []
         self._attachments: list[records.AttachmentIndex] = []
         self._content = hashlib.sha256()
-        self._compression = "lz4" if is_passing else "zstd"
-        self._compress = lz4.frame.compress if is_passing else ZstdCompressor(level=3).compress
+        self._form = form
+        self._compress = lz4.frame.compress if form.compression == "lz4" else ZstdCompressor(level=3).compress
         self._put(MAGIC + serialize(records.Header(profile=profile, library="mcap-landmarks")))
 
     def declare(self, connection: Connection) -> None:
@@ -146,7 +134,9 @@ class RecordingWriter:
         channel_id, group = self._connections[connection]
         chunk = self._chunks.get(group)
         if chunk is None:
-            chunk = self._chunks[group] = _Chunk(compressed=not group.startswith("image "))
+            chunk = self._chunks[group] = OpenChunk(
+                compressed=self._form.compresses(is_image=group.startswith("image "))
+            )
         data = chunk.data
         entries = chunk.index.get(channel_id)
         if entries is None:
@@ -159,7 +149,7 @@ class RecordingWriter:
         chunk.end_ns = max(chunk.end_ns, time_ns)
         self._message_counts[channel_id] += 1
         self.counts[connection.topic] += 1
-        if len(data) >= CHUNK_BYTES or chunk.end_ns - chunk.start_ns >= CHUNK_NS:
+        if len(data) >= self._form.size_bytes or chunk.end_ns - chunk.start_ns >= CHUNK_NS:
             for name in [key for key, other in self._chunks.items() if time_ns - other.start_ns >= CHUNK_NS]:
                 self._flush(self._chunks.pop(name))
             if group in self._chunks:
@@ -201,7 +191,7 @@ class RecordingWriter:
     def finish(self) -> None:
         """Write what is left, the metadata and the summary; afterwards the file is complete."""
         for group in sorted(self._chunks, key=lambda name: self._chunks[name].start_ns):
-            self._flush(self._chunks[group])
+            self._flush(self._chunks.pop(group))
         if "fingerprint" in self.metadata.get(RUN, {}):
             self.metadata[RUN][CONTENT] = entry_text(self._content.hexdigest())
         metadata_indexes = []
@@ -210,8 +200,7 @@ class RecordingWriter:
             metadata_indexes.append(records.MetadataIndex(length=len(data), name=name, offset=self._offset))
             self._put(data)
         self._put(serialize(records.DataEnd(data_section_crc=self._crc)))
-        starts = [index.message_start_time for index in self._chunk_indexes]
-        ends = [index.message_end_time for index in self._chunk_indexes]
+        first_ns, last_ns = self.times_ns() or (0, 0)
         statistics = records.Statistics(
             message_count=sum(self._message_counts.values()),
             schema_count=len(self._declared.schemas),
@@ -219,8 +208,8 @@ class RecordingWriter:
             attachment_count=len(self._attachments),
             metadata_count=len(metadata_indexes),
             chunk_count=len(self._chunk_indexes),
-            message_start_time=min(starts, default=0),
-            message_end_time=max(ends, default=0),
+            message_start_time=first_ns,
+            message_end_time=last_ns,
             channel_message_counts={key: count for key, count in self._message_counts.items() if count},
         )
         groups: list[list[records.McapRecord]] = [
@@ -246,13 +235,25 @@ class RecordingWriter:
             self.counts[self._declared.channels[channel_id].topic] += count
         self._put_chunk(chunk.record, chunk.indexes)
 
+    def count(self, connection: Connection) -> int:
+        """How many messages of a connection that is declared are written."""
+        return self._message_counts[self._declared.ids[connection]]
+
+    def times_ns(self) -> tuple[int, ...]:
+        """The first and the last log time of what is written, none if nothing is."""
+        starts = [chunk.message_start_time for chunk in self._chunk_indexes]
+        ends = [chunk.message_end_time for chunk in self._chunk_indexes]
+        starts += [chunk.start_ns for chunk in self._chunks.values()]
+        ends += [chunk.end_ns for chunk in self._chunks.values()]
+        return (min(starts), max(ends)) if starts else ()
+
     def declared(self) -> Declared:
         """The channels and schemas so far."""
         return self._declared
 
-    def _flush(self, chunk: _Chunk) -> None:
+    def _flush(self, chunk: OpenChunk) -> None:
         content = self._compress(chunk.data) if chunk.compressed else chunk.data
-        compression = self._compression.encode() if chunk.compressed else b""
+        compression = self._form.compression.encode() if chunk.compressed else b""
         head = CHUNK.pack(chunk.start_ns, chunk.end_ns, len(chunk.data), crc32(chunk.data))
         head += _LENGTH.pack(len(compression)) + compression + _LENGTH_8.pack(len(content))
         record = b"".join((RECORD.pack(Opcode.CHUNK, len(head) + len(content)), head, content))

@@ -2,21 +2,37 @@
 
 import contextlib
 import hashlib
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from mcap_landmarks.config import Settings
-from mcap_landmarks.errors import ToolkitError, UsageError
+from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
 from mcap_landmarks.inspection.open_logs import OpenLog, open_logs
 from mcap_landmarks.locations import Location, to_write
 from mcap_landmarks.manifest import file_hash
-from mcap_landmarks.progress import Watch
-from mcap_landmarks.runs.conversion import Converted, Job, Selection
+from mcap_landmarks.progress import Progress, Watch
+from mcap_landmarks.recording.chunk_form import ChunkForm
+from mcap_landmarks.recording.reader import open_recording
+from mcap_landmarks.runs.conversion import Converted, Job
+from mcap_landmarks.runs.conversion_inputs import ConversionInputs
 from mcap_landmarks.runs.outputs import make_folder, no_empty_folder, output_files
-from mcap_landmarks.runs.replacing import check_apart, earlier_recording, output_to
+from mcap_landmarks.runs.replacing import Replacing, check_apart, earlier_recording, output_to
+from mcap_landmarks.runs.split_outputs import write_parts
+from mcap_landmarks.runs.splitting import Split
+from mcap_landmarks.runs.topic_selection import Selection
+
+
+@dataclass(frozen=True, slots=True)
+class OutputForm:
+    """How outputs are written: in parts, with chunks of another form."""
+
+    split: Split | None = None
+    chunks: ChunkForm | None = None
+
+
+_PLAIN = OutputForm()
 
 
 @dataclass(slots=True)
@@ -38,6 +54,7 @@ def convert(
     overwrite: bool = False,
     strict: bool = False,
     verb: str = "convert",
+    form: OutputForm = _PLAIN,
 ) -> Conversion:
     """Convert the logs of some inputs: into the file `output`, merged by time, or one by one into that folder.
 
@@ -49,26 +66,22 @@ def convert(
     Raises:
         ToolkitError: nothing could be converted; nothing is left behind.
     """
-    there, patterns = to_write(output), _patterns(selection.topics)
+    there = to_write(output)
     conversion = Conversion()
-    for place, count in Counter(inputs).items():
-        if count > 1:
-            raise UsageError(f"{place} is given {count} times; name each input once")
+    _check_once(inputs)
     with contextlib.ExitStack() as stack:
         logs = [log for place in inputs for log in stack.enter_context(open_logs(place, settings))]
         stack.enter_context(no_empty_folder(there))
-        plan = _plan(logs, there)
+        plan = _plan(logs, there, form)
         check_apart(plan, [*inputs, *beside])
         hashes = {path: _content_hash(path, watch) for path in dict.fromkeys(log.path for log in logs)}
         for target, group in plan.items():
             earlier = earlier_recording(verb, [hashes[log.path] for log in group])
             try:
-                job = Job(target, group, selection, patterns, strict=strict, verb=verb)
-                with (
-                    output_to(target, (), earlier, overwrite=overwrite),
-                    watch(f"{verb} to {target.name}", sum(log.size_bytes for log in group)) as advance,
-                ):
-                    conversion.outputs.append(job.run(hashes, advance))
+                job = Job(ConversionInputs(group, selection, strict=strict), hashes, form.chunks, verb)
+                replacing = Replacing(earlier, overwrite)
+                with watch(f"{verb} to {target.name}", sum(log.size_bytes for log in group)) as advance:
+                    conversion.outputs += _written(job, target, form, replacing, advance)
             except ToolkitError as error:
                 conversion.failures.append(error)
         if not conversion.outputs:
@@ -76,16 +89,31 @@ def convert(
     return conversion
 
 
-def _plan(logs: Sequence[OpenLog], output: Path) -> dict[Path, list[OpenLog]]:
+def _check_once(inputs: Sequence[Location]) -> None:
+    for place, count in Counter(inputs).items():
+        if count > 1:
+            raise UsageError(f"{place} is given {count} times; name each input once")
+
+
+def _written(job: Job, target: Path, form: OutputForm, replacing: Replacing, advance: Progress) -> list[Converted]:
+    if form.split:
+        return write_parts(job, target, form.split, replacing, advance)
+    with output_to(target, (), replacing.is_earlier, overwrite=replacing.overwrite):
+        return [job.run(target, advance)]
+
+
+def _plan(logs: Sequence[OpenLog], output: Path, form: OutputForm) -> dict[Path, list[OpenLog]]:
     """Which logs go into which file."""
     several = len(logs) > len({log.path for log in logs})
+    if form.split and output.suffix == ".mcap":
+        raise UsageError(f"{output}: a split makes several files; give -o a folder, without .mcap")
     if output.suffix == ".mcap":
         if several:
             raise UsageError(f"{output}: the input holds {len(logs)} logs; give -o a folder, without .mcap")
         plan = {next(iter(output_files([output], output).values())): list(logs)}
     else:
         names = [Path(f"{log.name}.mcap") for log in logs]
-        targets = _in_folder(names, output) if several else list(output_files(names, output).values())
+        targets = _in_folder(names, output) if several or form.split else list(output_files(names, output).values())
         plan = {target: [log] for target, log in zip(targets, logs, strict=True)}
     return plan
 
@@ -99,15 +127,13 @@ def _in_folder(names: Sequence[Path], folder: Path) -> list[Path]:
     return targets
 
 
-def _patterns(topics: Sequence[str]) -> list[re.Pattern[str]]:
-    try:
-        return [re.compile(topic) for topic in topics]
-    except re.error as error:
-        raise UsageError(f"--topics {error.pattern!r} is not a regular expression: {error}") from error
-
-
 def _content_hash(path: Path, watch: Watch) -> str:
-    """SHA-256 of a file, or of the names and hashes of a folder's files."""
+    """SHA-256 of a file, or of the names and hashes of a folder's files; of a recording, over its CRCs."""
+    if path.suffix == ".mcap" and path.is_file():
+        with contextlib.suppress(RecordingError), open_recording(path) as recording:
+            found = recording.content_hash()
+            if found is not None:
+                return found
     files = [path] if path.is_file() else sorted(file for file in path.rglob("*") if file.is_file())
     with watch(f"hash {path.name}", sum(file.stat().st_size for file in files)) as advance:
         hashes = [file_hash(file, advance) for file in files]

@@ -15,11 +15,11 @@ from mcap_landmarks.recording.damage import Damage
 from mcap_landmarks.recording.opening import begins_or_ends
 from mcap_landmarks.recording.reader import Recording, open_recording, reading_from_front
 from mcap_landmarks.recording.writer import RecordingWriter, create_recording
-from mcap_landmarks.runs.conversion import Selection
 from mcap_landmarks.runs.convert import convert
 from mcap_landmarks.runs.loss_report import REPORT, loss_report
 from mcap_landmarks.runs.outputs import output_files
 from mcap_landmarks.runs.replacing import check_apart, earlier_recording, output_to
+from mcap_landmarks.runs.topic_selection import Selection
 
 _ROSBAG2 = "rosbag2"
 """The metadata record that counts a bag's messages: it stays true only where none is lost."""

@@ -5,6 +5,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from mcap_landmarks.atomic import check_target, held
@@ -16,6 +17,14 @@ from mcap_landmarks.recording.reader import open_recording
 
 IsEarlier = Callable[[Path], bool]
 """Says of a file that is there whether it is an earlier result of what is made now."""
+
+
+@dataclass(frozen=True, slots=True)
+class Replacing:
+    """What outputs may replace: earlier results of the same, or with `overwrite` anything but what is read."""
+
+    is_earlier: IsEarlier
+    overwrite: bool
 
 
 @contextlib.contextmanager
