@@ -40,6 +40,7 @@ CASES = (
     "scan_in_mm",
     "scan_range_max_zero",
     "scan_time_increment_us",
+    "output_named_bag",
     "schema_short_names",
     "schemas_missing",
     "service_event_topic",

@@ -32,6 +32,7 @@ class OutputForm:
     chunks: ChunkForm | None = None
 
 
+_OTHER_FORMATS = frozenset({".bag", ".db3"})
 _PLAIN = OutputForm()
 
 
@@ -74,6 +75,8 @@ def convert(
         stack.enter_context(no_empty_folder(there))
         plan = _plan(logs, there, form)
         check_apart(plan, [*inputs, *beside])
+        if there.suffix in _OTHER_FORMATS and there in plan:
+            raise UsageError(f"{there}: convert writes MCAP; name the output {there.stem}.mcap, or give a folder")
         hashes = {path: _content_hash(path, watch) for path in dict.fromkeys(log.path for log in logs)}
         for target, group in plan.items():
             earlier = earlier_recording(verb, [hashes[log.path] for log in group])
