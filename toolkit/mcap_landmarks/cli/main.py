@@ -14,6 +14,8 @@ from mcap_landmarks.cli.option_groups import spread
 from mcap_landmarks.errors import UsageError
 
 _NOT_VERBS = {"__init__", "main", "console", "option_groups", "options", "stage_runs", "conversion_options"}
+_READ_NO_LOGS = {"batch", "config", "demo", "generate", "models", "teleop"}
+"""Verbs that take no bound on what files may claim; `batch` passes it on."""
 _HELP = "Landmark maps and positions from robot recordings, offline and without ROS."
 
 
@@ -43,10 +45,14 @@ def build(asked: str | None) -> typer.Typer:
             app.command(verb, help=short_help)(_stand_in)
             continue
         module = importlib.import_module(f"mcap_landmarks.cli.{verb}")
+        reads = verb not in _READ_NO_LOGS
         if hasattr(module, "app"):
+            for own in module.app.registered_commands if reads else ():
+                if not hasattr(own.callback, "__wrapped__"):  # not yet, by an earlier call of this
+                    own.callback = spread(own.callback, reads=reads)
             app.add_typer(module.app, name=verb, help=short_help)
         else:
-            settings, command = getattr(module, "context_settings", None), spread(module.command)
+            settings, command = getattr(module, "context_settings", None), spread(module.command, reads=reads)
             app.command(verb, help=command.__doc__ or short_help, context_settings=settings)(command)
     return app
 
@@ -76,6 +82,8 @@ def run(arguments: list[str] | None = None) -> None:
     # NumPy's products are of small matrices, which BLAS shares out among threads that mostly wait in a loop for each
     # other: that took a third of the processor time of clustering. It reads this when NumPy is first imported, later.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # OpenCV decodes up to 2**30 pixels by itself, and reads kinds of images whose headers `vision` does not.
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(1 << 26))
     given = sys.argv[1:] if arguments is None else arguments
     asked = next((word for word in given if not word.startswith("-")), None)
     application: Callable[..., object] = build(asked)

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from inspect import Parameter
 from typing import TYPE_CHECKING, get_type_hints
 
+from mcap_landmarks import memory
 from mcap_landmarks.cli import options
 from mcap_landmarks.errors import UsageError
 
@@ -108,8 +109,11 @@ class ScanOptions:
         return [f"cluster.slice_m=[{slice_m[0]}, {slice_m[1]}]"]
 
 
-def spread(command: Callable[..., None]) -> Callable[..., None]:
-    """The same command with every group of options among its parameters spread out, behind the command's own."""
+def spread(command: Callable[..., None], *, reads: bool = False) -> Callable[..., None]:
+    """The same command with every group of options among its parameters spread out, behind the command's own.
+
+    One that `reads` files takes `--max-memory` as well.
+    """
     hints = get_type_hints(command, include_extras=True)
     groups = {name: hint for name, hint in hints.items() if isinstance(hint, type) and dataclasses.is_dataclass(hint)}
     parameters = [
@@ -118,9 +122,15 @@ def spread(command: Callable[..., None]) -> Callable[..., None]:
         if name not in groups
     ]
     parameters += [single for group in groups.values() for single in _single(group)]
+    if reads:
+        bound = Parameter("max_memory", Parameter.KEYWORD_ONLY, default=None, annotation=options.MaxMemory)
+        parameters = [parameter.replace(kind=Parameter.KEYWORD_ONLY) for parameter in parameters] + [bound]
 
     @functools.wraps(command)
     def taking(**given: object) -> None:
+        if reads:
+            size = given.pop("max_memory")
+            memory.allow(None if size is None else str(size))
         for name, group in groups.items():
             given[name] = group(**{field.name: given.pop(field.name) for field in dataclasses.fields(group)})
         command(**given)

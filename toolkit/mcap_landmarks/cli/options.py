@@ -135,6 +135,14 @@ ConfigFile = Annotated[
     Location | None, typer.Option("--config", parser=location, help="TOML file with one table per stage.")
 ]
 Set = Annotated[list[str] | None, typer.Option("--set", metavar="STAGE.KEY=VALUE", help="One setting; repeatable.")]
+MaxMemory = Annotated[
+    str | None,
+    typer.Option(
+        "--max-memory",
+        metavar="SIZE",
+        help="What one thing in a file may take, such as 4G; half the machine's if unset.",
+    ),
+]
 Method = Annotated[str | None, typer.Option("--method", help="Sets the method of every stage: default or thesis.")]
 
 

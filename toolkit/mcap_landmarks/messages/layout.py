@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from struct import error as struct_error
-from typing import Any
 
 import numpy as np
 from rosbags.interfaces import Nodetype
@@ -11,6 +10,7 @@ from rosbags.typesys import TypesysError, get_types_from_msg
 
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.messages.columns import Children, Kind, Moments, Numbers, Rows, Table, Text, Texts
+from mcap_landmarks.messages.definition_extent import FieldType, check_extent
 
 _SCALARS = {
     "bool": "?", "byte": "<u1", "char": "<u1", "octet": "<u1", "int8": "<i1", "uint8": "<u1", "int16": "<i2",
@@ -20,7 +20,6 @@ _SCALARS = {
 _BYTES = (np.dtype("<u1"), np.dtype("<i1"))
 _MOMENTS = frozenset({"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"})
 _LITTLE_ENDIAN = b"\x00\x01"
-FieldType = Any  # of rosbags: (kind, content), nested
 Definition = Mapping[str, list[tuple[str, FieldType]]]
 _Flat = tuple[np.dtype[np.number], int, Kind]
 
@@ -40,8 +39,9 @@ class Layout:
         try:
             types = get_types_from_msg(schema, ros_type)
             self.definition: Definition = {name: fields for name, (_, fields) in types.items()}
+            check_extent(self.definition, ros_type)
             parts = self._rows().parts
-        except (TypesysError, KeyError, RecursionError) as error:
+        except (TypesysError, KeyError, RecursionError, MessageError) as error:
             reason = error or type(error).__name__
             raise MessageError(f"{ros_type}: its schema cannot be understood ({reason})") from error
         self.stamped = isinstance(next(iter(parts), None), Moments)

@@ -1,5 +1,6 @@
 """Blocks of a recording to records: decompress, check, part."""
 
+import io
 from collections.abc import Iterator
 from struct import error as struct_error
 from typing import BinaryIO
@@ -7,6 +8,7 @@ from typing import BinaryIO
 import lz4.frame
 import zstandard
 
+from mcap_landmarks import memory
 from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.container import CHUNK, LARGEST_CHUNK, RECORD, Opcode
 from mcap_landmarks.recording.summary_index import Block
@@ -39,15 +41,18 @@ def cut_chunk_content(record: bytes | memoryview) -> memoryview:
     Raises:
         DamagedBlockError: not even its header is there, or the bytes are not what it says.
     """
-    _, _, compression, data, _ = _header(record)
+    size, _, compression, data, _ = _header(record)
     content = data
     try:
         if compression == "zstd":
-            content = memoryview(zstandard.ZstdDecompressor().decompressobj().decompress(data))
+            stream = zstandard.ZstdDecompressor().stream_reader(io.BytesIO(data))
+            content = memoryview(memory.read_within(stream, len(data), size))
         elif compression == "lz4":
-            content = memoryview(lz4.frame.LZ4FrameDecompressor().decompress(data))
-    except (zstandard.ZstdError, RuntimeError, EOFError) as error:
+            content = memoryview(lz4.frame.LZ4FrameDecompressor().decompress(data, size))
+    except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
         raise DamagedBlockError(f"{compression} cannot decompress it") from error
+    except memory.TooLargeError as error:
+        raise DamagedBlockError(str(error)) from error
     position = 0
     while position + RECORD.size <= len(content):
         end = position + RECORD.size + RECORD.unpack_from(content, position)[1]
@@ -67,6 +72,8 @@ def _header(record: bytes | memoryview) -> tuple[int, int, str, memoryview, int]
         raise DamagedBlockError("its header is damaged") from error
     if size > LARGEST_CHUNK:
         raise DamagedBlockError(f"it claims {size} bytes")
+    if compression and (problem := memory.excess(size, len(record))):
+        raise DamagedBlockError(problem)
     start = 32 + name_length + 8
     length = int.from_bytes(record[start - 8 : start], "little")
     return size, crc, compression, memoryview(record)[start : start + length], length
@@ -81,8 +88,12 @@ def _decompress(compression: str, data: memoryview, size: int) -> memoryview:
                 raise DamagedBlockError("its sizes contradict each other")
             return memoryview(zstandard.ZstdDecompressor().decompress(data, max_output_size=size))
         if compression == "lz4":
-            return memoryview(lz4.frame.decompress(data))
-    except (zstandard.ZstdError, RuntimeError, MemoryError) as error:
+            stream = lz4.frame.LZ4FrameDecompressor()
+            content = memoryview(stream.decompress(data, size))
+            if not stream.eof and len(content) == size and stream.decompress(b"", 1):
+                raise DamagedBlockError(f"it holds more than the {size} bytes that it claims")
+            return content
+    except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
         raise DamagedBlockError(f"{compression} cannot decompress it") from error
     raise DamagedBlockError(f"its compression {compression!r} is unknown")
 

@@ -2,7 +2,7 @@
 
 import contextlib
 import hashlib
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextvars import ContextVar
 from functools import cached_property
 from itertools import chain
@@ -230,7 +230,7 @@ class Recording:
         ]
         return sorted(blocks, key=lambda block: (block.start_ns, block.offset))
 
-    def _load(self, block: Block, wanted: dict[int, Connection], progress: Progress | None) -> list[RawMessage]:
+    def _load(self, block: Block, wanted: dict[int, Connection], progress: Progress | None) -> Sequence[RawMessage]:
         try:
             found = messages_in(block_content(self._stream, block, verify=self._verify), wanted)
         except DamagedBlockError as error:

@@ -2,12 +2,16 @@
 
 import bz2
 import struct
+from array import array
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import BinaryIO, NamedTuple
 
 import lz4.frame
+import numpy as np
 
+from mcap_landmarks import memory
 from mcap_landmarks.sources._definition_text import decoded
 
 MAGIC = b"#ROSBAG V2.0\n"
@@ -176,6 +180,8 @@ def decompress(header: Header, data: bytes) -> tuple[memoryview, bool]:
     compression, size = field(header, b"compression").decode(errors="replace"), uint32(field(header, b"size"))
     if size > LARGEST_CHUNK:
         raise DamagedBagError(f"it claims {size} bytes")
+    if problem := memory.excess(size, len(data)):
+        raise DamagedBagError(problem)
     try:
         if compression == "none":
             content = data
@@ -185,16 +191,18 @@ def decompress(header: Header, data: bytes) -> tuple[memoryview, bool]:
             content = lz4.frame.LZ4FrameDecompressor().decompress(data, size)
         else:
             raise DamagedBagError(f"its compression {compression!r} is unknown")
-    except (OSError, RuntimeError, EOFError) as error:
+    except (OSError, RuntimeError, EOFError, MemoryError) as error:
         raise DamagedBagError(f"{compression} cannot decompress it") from error
     return memoryview(content), len(content) == size
 
 
-def parse_chunk(content: memoryview) -> tuple[list[BagMessage], dict[int, BagConnection], str | None]:
-    """Messages and connections of a chunk's content in the order written, and what was wrong with it, if anything."""
+def parse_chunk(content: memoryview) -> tuple[Sequence[BagMessage], dict[int, BagConnection], str | None]:
+    """Messages by time and connections of a chunk's content, and what was wrong with it, if anything."""
+    if not memory.is_small(content):
+        return _parse_one_by_one(content)
     messages: list[BagMessage] = []
     connections: dict[int, BagConnection] = {}
-    position, end = 0, len(content)
+    position, end, problem = 0, len(content), None
     op = conn = time = 0  # where the last message had its fields: most often the next has them there, too
     try:
         while position < end:
@@ -217,8 +225,39 @@ def parse_chunk(content: memoryview) -> tuple[list[BagMessage], dict[int, BagCon
                 key, connection = parse_connection(header, data)
                 connections[key] = connection
     except DamagedBagError as error:
-        return messages, connections, str(error)
-    return messages, connections, None
+        problem = str(error)
+    messages.sort(key=lambda message: message.time_ns)
+    return messages, connections, problem
+
+
+def _parse_one_by_one(
+    content: memoryview,
+) -> tuple[Sequence[BagMessage], dict[int, BagConnection], str | None]:
+    """The same of a large chunk, which may hold millions: only where they lie and their times are kept."""
+    starts, times, keys = array("q"), array("q"), array("q")
+    connections: dict[int, BagConnection] = {}
+    position, end, problem = 0, len(content), None
+    try:
+        while position < end:
+            begin = position
+            start, stop, data_start, position = _extent(content, position, end)
+            header = parse_header(content[start:stop])
+            if operation(header) == MESSAGE:
+                times.append(time_ns(field(header, b"time")))
+                keys.append(uint32(field(header, b"conn")))
+                starts.append(begin)
+            elif operation(header) == CONNECTION:
+                key, connection = parse_connection(header, content[data_start:position])
+                connections[key] = connection
+    except DamagedBagError as error:
+        problem = str(error)
+
+    def message(number: int) -> BagMessage:
+        _, _, data_start, stop = _extent(content, starts[number], end)
+        return BagMessage(times[number], keys[number], content[data_start:stop])
+
+    order = array("q", np.argsort(np.asarray(times), kind="stable").astype("<i8").tobytes())
+    return memory.Lazily(order, message), connections, problem
 
 
 def _extent(content: memoryview, position: int, end: int) -> tuple[int, int, int, int]:

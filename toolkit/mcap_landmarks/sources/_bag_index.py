@@ -1,6 +1,7 @@
 """What a ROS 1 bag holds and where: from the index at its end, or by scanning a bag that has none."""
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
@@ -155,14 +156,13 @@ def _scan_chunk(stream: BinaryIO, size: int, offset: int, index: BagIndex) -> bo
 
 def read_chunk(
     stream: BinaryIO, size: int, offset: int
-) -> tuple[list[BagMessage], dict[int, BagConnection], str | None]:
+) -> tuple[Sequence[BagMessage], dict[int, BagConnection], str | None]:
     """Messages of the chunk at an offset by time, its connections, and what was wrong with it, None for nothing."""
     try:
         content, whole = _content(stream, size, offset)
     except DamagedBagError as error:
         return [], {}, str(error)
     messages, connections, problem = container.parse_chunk(content)
-    messages.sort(key=lambda message: message.time_ns)
     return messages, connections, problem or (None if whole else "it is cut")
 
 

@@ -52,7 +52,7 @@ def _description(about: Mapping[str, object]) -> BagDescription:
         _names(files),
         name if isinstance(name, str) and known_distribution(name) else None,
         dict(_types(topics)) if isinstance(topics, list) else {},
-        int(count) if isinstance(count, str) and count.isdecimal() else None,
+        int(count) if isinstance(count, str) and count.isdecimal() and len(count) < 20 else None,
         {key: one for key, one in custom.items() if isinstance(one, str)} if isinstance(custom, dict) else {},
     )
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import zstandard
 
+from mcap_landmarks import memory
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.sources._db3_salvage import salvaged_rows
@@ -29,6 +30,8 @@ from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 from mcap_landmarks.wording import counted
 
 ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+_PIECE_BYTES = 256
+"""So much is unpacked at a time of what does not say its size: zstd makes at most 128 KiB of 4 bytes (RFC 8878)."""
 _REPORT_BYTES = 1 << 20
 """Progress is told each time that so much was read."""
 _FIRST, _LAST = -(2**63), 2**63 - 1
@@ -45,14 +48,30 @@ def unpacked(data: Payload) -> Payload:
     """
     if data[:4] != ZSTD_MAGIC:
         return data
-    stream = zstandard.ZstdDecompressor().decompressobj()
     try:
-        content = stream.decompress(data)
-    except zstandard.ZstdError as error:
+        size = zstandard.frame_content_size(data)
+        if size < 0:
+            return _unpacked_in_pieces(data)
+        if problem := memory.excess(size, len(data)):
+            raise MessageError(f"{len(data)} bytes are not decompressed: {problem}")
+        return zstandard.ZstdDecompressor().decompress(data)
+    except (zstandard.ZstdError, MemoryError) as error:
         raise MessageError(f"{len(data)} bytes cannot be decompressed ({error})") from error
+
+
+def _unpacked_in_pieces(data: bytes | memoryview) -> bytes:
+    """A payload that does not say how large it is."""
+    stream = zstandard.ZstdDecompressor().decompressobj()
+    content, largest = bytearray(), memory.most(len(data))
+    for start in range(0, len(data), _PIECE_BYTES):
+        if stream.eof:
+            break
+        content += stream.decompress(data[start : start + _PIECE_BYTES])
+        if len(content) > largest:
+            raise MessageError(f"{len(data)} bytes unpack to more than {memory.shown(largest)}")
     if not stream.eof:
         raise MessageError(f"{len(data)} bytes cannot be decompressed (they are cut)")
-    return content
+    return bytes(content)
 
 
 class Db3Log:

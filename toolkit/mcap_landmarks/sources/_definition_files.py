@@ -10,7 +10,7 @@ from rosbags.typesys import get_types_from_idl, get_types_from_msg
 from rosbags.typesys.base import TypesysError
 
 from mcap_landmarks.errors import MessageError, UsageError
-from mcap_landmarks.messages.layout import FieldType
+from mcap_landmarks.messages.definition_extent import FieldType
 from mcap_landmarks.sources._definition_text import decoded, parts_of, plain
 from mcap_landmarks.sources._type_graph import Fields, MessageFields
 

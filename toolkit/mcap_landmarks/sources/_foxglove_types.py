@@ -9,7 +9,7 @@ from rosbags.interfaces import Nodetype
 
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.geometry.frames import apply, is_rigid, rigid
-from mcap_landmarks.messages.layout import FieldType
+from mcap_landmarks.messages.definition_extent import FieldType
 from mcap_landmarks.messages.parts import Array, header_to_ros, make, pose_to_ros, stamp_to_ros
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.transforms import TFMessage, Transform

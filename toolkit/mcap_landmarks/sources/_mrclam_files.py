@@ -3,6 +3,7 @@
 import math
 import re
 import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -12,11 +13,14 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 from numpy.typing import NDArray
 
+from mcap_landmarks import memory
 from mcap_landmarks.errors import RecordingError
 
 _ROBOT = re.compile(r"Robot(\d+)_(Odometry|Measurement|Groundtruth)\.dat")
 _COLUMNS = {"Odometry": 3, "Measurement": 4, "Groundtruth": 4}
 """How many columns a table has, the time among them, as the data set's page says (Leung et al. 2011)."""
+_SMALL_TABLE = 16 << 20
+"""A table of so many bytes is taken out of any zip: those of the data set have up to 5 MB, and shrink to a quarter."""
 Array = NDArray[np.float64]
 
 
@@ -68,13 +72,16 @@ class DataSet:
 
     def _read(self, name: str) -> str:
         where = self._names[name]
+        if isinstance(self._contents, zipfile.ZipFile):
+            about = self._contents.getinfo(where)
+            memory.check(f"{self.path}: {where}", about.file_size, about.compress_size, _SMALL_TABLE)
         try:
             data = (
                 self._contents.read(where)
                 if isinstance(self._contents, zipfile.ZipFile)
                 else (self._contents / where).read_bytes()
             )
-        except (zipfile.BadZipFile, OSError, EOFError) as error:
+        except (zipfile.BadZipFile, OSError, EOFError, zlib.error, NotImplementedError, RuntimeError) as error:
             raise RecordingError(f"{self.path}: {where} cannot be read ({error}); download it again") from error
         return data.decode(errors="replace")
 

@@ -7,7 +7,7 @@ from struct import error as struct_error
 from rosbags.interfaces import Nodetype
 from rosbags.serde.utils import SIZEMAP
 
-from mcap_landmarks.messages.layout import FieldType
+from mcap_landmarks.messages.definition_extent import FieldType
 from mcap_landmarks.sources._shape import Payload
 
 Definitions = Mapping[str, tuple[object, list[tuple[str, FieldType]]]]

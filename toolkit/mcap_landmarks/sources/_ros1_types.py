@@ -15,7 +15,7 @@ from rosbags.typesys.base import TypesysError
 from rosbags.typesys.store import Typestore
 
 from mcap_landmarks.errors import MessageError
-from mcap_landmarks.messages.layout import FieldType
+from mcap_landmarks.messages.definition_extent import FieldType
 from mcap_landmarks.messages.typestore import definition, full_name, typestore
 from mcap_landmarks.sources._definition_files import NO_FILES, DefinitionFiles
 from mcap_landmarks.sources._definition_text import is_empty, plain

@@ -6,7 +6,7 @@ from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import Constdefs
 
 from mcap_landmarks.errors import MessageError
-from mcap_landmarks.messages.layout import FieldType
+from mcap_landmarks.messages.definition_extent import FieldType, check_extent
 
 Fields = list[tuple[str, FieldType]]
 MessageFields = tuple[Constdefs, Fields]
@@ -27,7 +27,7 @@ def needed_by(name: str, find: Callable[[str], MessageFields | None]) -> dict[st
     """A type with all that it needs, itself first; `find` knows each of them.
 
     Raises:
-        MessageError: something is missing, or a type holds itself.
+        MessageError: something is missing, a type holds itself, or it expands to too much.
     """
     found: dict[str, MessageFields] = {}
 
@@ -45,6 +45,7 @@ def needed_by(name: str, find: Callable[[str], MessageFields | None]) -> dict[st
                 take(nested, (*within, one))
 
     take(name, ())
+    check_extent({one: fields for one, (_, fields) in found.items()}, name)
     return found
 
 

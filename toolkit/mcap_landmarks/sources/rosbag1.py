@@ -130,20 +130,20 @@ class BagLog:
         carried: dict[int, tuple[Connection, Convert]],
         within_ns: tuple[int, int],
         progress: Progress | None,
-    ) -> list[RawMessage]:
+    ) -> Iterator[RawMessage]:
         """Messages of a chunk, converted."""
-        messages = []
         first, last = within_ns
         for time_ns, key, data in self._checked(chunk, progress):
             if key in carried and first <= time_ns < last:
                 connection, convert = carried[key]
                 try:
-                    messages.append(RawMessage(connection, time_ns, time_ns, 0, convert(data)))
+                    converted_data = convert(data)
                 except MessageError as error:
                     self._misfit(connection, error)
-        return messages
+                else:
+                    yield RawMessage(connection, time_ns, time_ns, 0, converted_data)
 
-    def _checked(self, chunk: ChunkInfo, progress: Progress | None) -> list[BagMessage]:
+    def _checked(self, chunk: ChunkInfo, progress: Progress | None) -> Sequence[BagMessage]:
         """Messages of a chunk; what it lacks is told."""
         with self._path.open("rb") as stream:
             found, _, problem = read_chunk(stream, self._size, chunk.offset)

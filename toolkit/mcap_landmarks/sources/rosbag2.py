@@ -7,9 +7,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import BinaryIO
 
 import zstandard
 
+from mcap_landmarks import memory
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.sources._bag_folder import SUFFIXES, files_of, single_file, storage_files
 from mcap_landmarks.sources._bag_metadata import METADATA
@@ -20,6 +22,8 @@ from mcap_landmarks.sources._mcap import carry
 from mcap_landmarks.sources._ros2_types import check_distribution
 from mcap_landmarks.sources._shape import Log, McapFile, Source, SourceLog
 
+_SMALL_FILE = 1 << 30
+"""So much may be unpacked from any file, into a temporary one: bags of still pictures shrink to a thousandth."""
 _MAGICS = (b"SQLite format 3\0", b"\x89MCAP0\r\n")
 
 
@@ -121,10 +125,12 @@ def _temporary(file: Path, size: int, *, compressed: bool) -> Iterator[Path]:
         try:
             with file.open("rb") as source, copy.open("wb") as target:
                 if compressed:
-                    shutil.copyfileobj(zstandard.ZstdDecompressor().stream_reader(source), target)
+                    _unpack(zstandard.ZstdDecompressor().stream_reader(source), target, size)
                 else:
                     shutil.copyfileobj(source, target)
                     target.truncate(size)
+        except memory.TooLargeError as error:
+            raise RecordingError(f"{file}: {error}; if that is right, allow it with --max-memory") from error
         except zstandard.ZstdError as error:
             raise RecordingError(f"{file} cannot be decompressed ({error}); copy it again") from error
         except OSError as error:
@@ -133,6 +139,15 @@ def _temporary(file: Path, size: int, *, compressed: bool) -> Iterator[Path]:
                 f"{file} cannot be unpacked into {where} ({error.strerror}); free space there"
             ) from error
         yield copy
+
+
+def _unpack(source: zstandard.ZstdDecompressionReader, target: BinaryIO, size: int) -> None:
+    """Copy what a decompressor makes of so many bytes, if that is in proportion to them; memory does not matter."""
+    largest = memory.most(size, _SMALL_FILE)
+    while piece := source.read(1 << 20):
+        target.write(piece)
+        if target.tell() > largest:
+            raise memory.TooLargeError(f"it unpacks to more than {memory.shown(largest)}")
 
 
 SOURCE = Source("rosbag2", "ROS 2 bags (folder, .db3, .mcap, also .zstd)", Rosbag2Config, recognises, open_bag)

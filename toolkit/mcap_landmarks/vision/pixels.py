@@ -8,9 +8,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from mcap_landmarks import memory
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.messages.images import CompressedImage, Image
 from mcap_landmarks.messages.video import codec_of
+from mcap_landmarks.vision.image_header import size_in_header
 
 Rgb = NDArray[np.uint8]
 """An image (H, W, 3), 8 bits each of red, green and blue."""
@@ -89,6 +91,9 @@ def _from_file(message: CompressedImage) -> Rgb:
         raise MessageError("the image is empty")
     if data.startswith(_JPEG_START) and _JPEG_END not in data[-_TRAILER_BYTES:]:
         raise MessageError(f"the JPEG of {len(data)} bytes is cut short")
+    width, height = size_in_header(data) or (0, 0)
+    if problem := memory.excess(width * height * 3, len(data)):
+        raise MessageError(f"the image of {width} x {height} pixels is not decoded: {problem}")
     # CameraInfo speaks of pixels as they are stored, so an orientation tag must not turn them.
     mosaic = _ENCODINGS.get(message.format.partition(";")[0].strip())
     mosaic = mosaic if message.format.startswith("bayer_") else None
