@@ -78,13 +78,13 @@ def lz4_chunk(folder: Path) -> Path:
 
 def tiny_records(folder: Path) -> Path:
     """A chunk of millions of records without content."""
-    content = struct.pack("<BQ", 0x7F, 0) * 2_000_000
+    content = struct.pack("<BQ", 0x7F, 0) * 500_000
     return _mcap(folder / "tiny.mcap", _chunk(len(content), b"zstd", zstandard.ZstdCompressor(3).compress(content)))
 
 
 def tiny_messages(folder: Path) -> Path:
     """A chunk of millions of messages without content."""
-    content = (struct.pack("<BQ", 5, 22) + struct.pack("<HIQQ", 1, 0, 1, 1)) * 300_000
+    content = (struct.pack("<BQ", 5, 22) + struct.pack("<HIQQ", 1, 0, 1, 1)) * 150_000
     return _mcap(folder / "messages.mcap", _chunk(len(content), b"zstd", zstandard.ZstdCompressor(3).compress(content)))
 
 
@@ -141,7 +141,7 @@ def lz4_bag(folder: Path) -> Path:
 
 def tiny_bag(folder: Path) -> Path:
     """A bag's chunk of millions of messages without content."""
-    content = _bag_record(b"", op=b"\2", conn=bytes(4), time=bytes(8)) * 200_000
+    content = _bag_record(b"", op=b"\2", conn=bytes(4), time=bytes(8)) * 100_000
     data = lz4.frame.compress(content)
     chunk = _bag_record(data, op=b"\5", compression=b"lz4", size=struct.pack("<I", len(content)))
     return _bag(folder / "tiny.bag", chunk)
