@@ -26,6 +26,11 @@ _LOG_PER_M2 = -3.7
 """Logarithm of objects per square metre where there are any: two side by side are less likely than one of two parts."""
 _FAR_M, _SURELY = 0.45, 4.0
 """Clusters farther apart become one only where the logarithm of the evidence gains more than this, not just any."""
+_MOST_PAIRS = 1500
+"""So many pairs of clusters are looked at in a scan at most, the nearest first. Scans of rooms and streets have some
+hundred; a scan of noise has every cluster near every other, and would take minutes and gigabytes."""
+_TOGETHER = 256
+"""So many clusters are explained at a time, which bounds the memory."""
 _UNKNOWN_M = 0.5
 """Hits of something of no known shape lie anywhere within so many metres along the view."""
 
@@ -147,7 +152,9 @@ class _Explainer:
             allowed = np.ones((len(asked), len(self._shapes)), dtype=np.bool_)
             for i, pair in enumerate(pairs, len(asked) - len(pairs)):
                 allowed[i] = pair.shapes
-            self._explain([asked[i] for i in new], allowed[new])
+            for start in range(0, len(new), _TOGETHER):
+                some = new[start : start + _TOGETHER]
+                self._explain([asked[i] for i in some], allowed[some])
         return [self._known[cluster] for cluster in (*clusters, *(pair.both for pair in pairs))]
 
     def _explain(self, clusters: Sequence[Cluster], allowed: NDArray[np.bool_]) -> None:
@@ -193,39 +200,71 @@ def _joined(beams: Beams, given: Sequence[Cluster], explain: _Explainer) -> list
     """The clusters that explain the given ones best, found by joining the pair that gains most again and again."""
     clusters = list(given)
     points = {cluster: points_of(beams, cluster) for cluster in clusters}
+    gains = np.full((len(clusters), len(clusters)), -np.inf)
+    pairs: dict[tuple[Cluster, Cluster], _Pair] = {}
+    left, changed = _MOST_PAIRS, list(range(len(clusters)))
     while True:
-        pairs = _pairs(clusters, points, explain)
-        found = [one.total for one in explain(clusters, pairs)]
-        alone = dict(zip(clusters, found, strict=False))
-        gains = [
-            joint - alone[pair.first] - alone[pair.second] - (_SURELY if pair.gap_m > _FAR_M else 0.0)
-            for pair, joint in zip(pairs, found[len(clusters) :], strict=True)
-        ]
-        best = int(np.argmax(gains)) if gains else -1
-        if best < 0 or gains[best] <= 0:
+        near = _near(clusters, points, explain, changed)[:left] if left else []
+        left -= len(near)
+        new = _pairs(clusters, points, explain, near)
+        found = [one.total for one in explain(clusters, [pair for _, pair in new])]
+        for ((i, j), pair), joint in zip(new, found[len(clusters) :], strict=True):
+            pairs[pair.first, pair.second] = pair
+            gains[i, j] = joint - found[i] - found[j] - (_SURELY if pair.gap_m > _FAR_M else 0.0)
+        first, second = np.unravel_index(int(np.argmax(gains)), gains.shape) if len(clusters) > 1 else (0, 0)
+        if not gains.size or gains[first, second] <= 0:
             return clusters
-        pair = pairs[best]
+        pair = pairs[clusters[first], clusters[second]]
         points[pair.both] = np.concatenate([points[pair.first], points[pair.second]])
-        clusters = [pair.both if cluster == pair.first else cluster for cluster in clusters if cluster != pair.second]
+        clusters[first] = pair.both
+        del clusters[second]
+        gains[first], gains[:, first] = -np.inf, -np.inf
+        gains = np.delete(np.delete(gains, second, axis=0), second, axis=1)
+        changed = [int(first)]
 
 
-def _pairs(clusters: Sequence[Cluster], points: Mapping[Cluster, Array], explain: _Explainer) -> list[_Pair]:
-    """The clusters that are near enough to each other to be one object."""
+def _near(
+    clusters: Sequence[Cluster], points: Mapping[Cluster, Array], explain: _Explainer, changed: Sequence[int]
+) -> list[tuple[int, int]]:
+    """The places of pairs with one of some clusters that could be near enough to be one object, nearest first."""
     if len(clusters) < 2:
         return []
+    middles, radii = _circles(clusters, points)
+    apart = np.hypot(*(middles[changed][:, None] - middles).T).T - np.add.outer(radii[changed], radii)
+    rows, others = np.nonzero(apart <= explain.widest_m)
+    places = np.asarray(changed)[rows]
+    kept = places < others if len(changed) > 1 else places != others
+    order = np.argsort(apart[rows, others][kept], kind="stable")
+    ends = np.sort(np.stack([places[kept], others[kept]], axis=1), axis=1)[order]
+    return [(i, j) for i, j in ends.tolist()]
+
+
+def _circles(clusters: Sequence[Cluster], points: Mapping[Cluster, Array]) -> tuple[Array, Array]:
+    """The middles (N, 2) of the hits of clusters, and how far (N,) they lie from these at most."""
     middles = np.array([points[cluster].mean(axis=0) for cluster in clusters])
-    radii = [
-        float(np.hypot(*(points[cluster] - middle).T).max()) for cluster, middle in zip(clusters, middles, strict=True)
-    ]
-    apart = np.hypot(*(middles[:, None] - middles).T) - np.add.outer(radii, radii)
+    offsets = (points[cluster] - middle for cluster, middle in zip(clusters, middles, strict=True))
+    return middles, np.array([float(np.hypot(*off.T).max()) for off in offsets])
+
+
+def _pairs(
+    clusters: Sequence[Cluster],
+    points: Mapping[Cluster, Array],
+    explain: _Explainer,
+    near: Sequence[tuple[int, int]],
+) -> list[tuple[tuple[int, int], _Pair]]:
+    """Those of the places of near pairs that some shape can bridge, in the order of the clusters."""
+    if not near:
+        return []
+    _, radii = _circles(clusters, points)
     found = []
-    for i, j in zip(*np.nonzero(np.triu(apart <= explain.widest_m, k=1)), strict=True):
+    for i, j in sorted(near):
         first, second = clusters[i], clusters[j]
         gap = gap_m(points[first], points[second])
-        shapes = explain.bridging(gap, (2 * radii[i], 2 * radii[j]), _is_one_view(first, second))
+        widths = (2 * float(radii[i]), 2 * float(radii[j]))
+        shapes = explain.bridging(gap, widths, _is_one_view(first, second))
         if shapes.any():
             both = tuple(sorted((*first, *second), key=lambda one: (one.sweep, one.first)))
-            found.append(_Pair(first, second, both, gap, shapes))
+            found.append(((i, j), _Pair(first, second, both, gap, shapes)))
     return found
 
 
