@@ -5,10 +5,8 @@ from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from struct import error as struct_error
 
-from mcap_landmarks.memory import is_small
 from mcap_landmarks.recording.blocks import DamagedBlockError, records_in
 from mcap_landmarks.recording.container import MESSAGE, MESSAGE_FIXED, RECORD, Opcode
-from mcap_landmarks.recording.large_chunks import many_messages_in
 from mcap_landmarks.stage import Connection, RawMessage
 
 Open = list[tuple[int, int, int, int, Sequence[RawMessage]]]
@@ -18,14 +16,12 @@ _SMALL_BYTES = 4096
 """Payloads up to a page are copied: that takes as long as a view of them does, and no garbage has to be looked for."""
 
 
-def messages_in(content: memoryview, wanted: Mapping[int, Connection]) -> Sequence[RawMessage]:
+def messages_in(content: memoryview, wanted: Mapping[int, Connection]) -> list[RawMessage]:
     """The wanted channels' messages of some records, by log time; messages of equal time keep their order.
 
     Raises:
         DamagedBlockError: a record runs over the end, or is too short for what it is.
     """
-    if not is_small(content):
-        return many_messages_in(content, wanted)
     found: list[RawMessage] = []
     # This loop runs for every message that is read: everything in it is a local name, records are unpacked with their
     # first 31 bytes as messages in one go, and RawMessage's own constructor, written in Python, is passed over.

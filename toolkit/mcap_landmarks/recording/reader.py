@@ -13,6 +13,7 @@ from mcap.exceptions import McapError
 
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, STAGE, carried_fingerprint
+from mcap_landmarks.memory import is_small
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.blocks import DamagedBlockError, block_content
 from mcap_landmarks.recording.chunk_copy import WholeChunk, read_whole
@@ -20,6 +21,7 @@ from mcap_landmarks.recording.chunk_messages import Open, drain, messages_in, pu
 from mcap_landmarks.recording.container import CHUNK, RECORD, parse
 from mcap_landmarks.recording.damage import SuspectChunk
 from mcap_landmarks.recording.declared_channels import Declared
+from mcap_landmarks.recording.large_chunks import many_messages_in
 from mcap_landmarks.recording.opening import index_of, open_stream
 from mcap_landmarks.recording.record_shapes import check_attachment
 from mcap_landmarks.recording.summary_index import Block, Index, indexed_messages, read_record
@@ -232,7 +234,8 @@ class Recording:
 
     def _load(self, block: Block, wanted: dict[int, Connection], progress: Progress | None) -> Sequence[RawMessage]:
         try:
-            found = messages_in(block_content(self._stream, block, verify=self._verify), wanted)
+            content = block_content(self._stream, block, verify=self._verify)
+            found = messages_in(content, wanted) if is_small(content) else many_messages_in(content, wanted)
         except DamagedBlockError as error:
             self.damage = self.damage.with_suspect(
                 SuspectChunk(block.offset, indexed_messages(self._stream, block), str(error))

@@ -91,9 +91,7 @@ def _from_file(message: CompressedImage) -> Rgb:
         raise MessageError("the image is empty")
     if data.startswith(_JPEG_START) and _JPEG_END not in data[-_TRAILER_BYTES:]:
         raise MessageError(f"the JPEG of {len(data)} bytes is cut short")
-    width, height = size_in_header(data) or (0, 0)
-    if problem := memory.excess(width * height * 3, len(data)):
-        raise MessageError(f"the image of {width} x {height} pixels is not decoded: {problem}")
+    _check_size(data)
     # CameraInfo speaks of pixels as they are stored, so an orientation tag must not turn them.
     mosaic = _ENCODINGS.get(message.format.partition(";")[0].strip())
     mosaic = mosaic if message.format.startswith("bayer_") else None
@@ -105,6 +103,13 @@ def _from_file(message: CompressedImage) -> Rgb:
         conversion = mosaic.conversion if image.ndim == 2 else None
         image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB if conversion is None else conversion)
     return _in_8_bits(image)
+
+
+def _check_size(data: bytes) -> None:
+    """Refuse what would decode to more than its bytes can stand for."""
+    width, height = size_in_header(data) or (0, 0)
+    if problem := memory.excess(width * height * 3, len(data)):
+        raise MessageError(f"the image of {width} x {height} pixels is not decoded: {problem}")
 
 
 def _from_rows(message: Image) -> Rgb:
