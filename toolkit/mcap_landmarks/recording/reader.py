@@ -23,6 +23,7 @@ from mcap_landmarks.recording.damage import SuspectChunk
 from mcap_landmarks.recording.declared_channels import Declared
 from mcap_landmarks.recording.large_chunks import many_messages_in
 from mcap_landmarks.recording.opening import index_of, open_stream
+from mcap_landmarks.recording.overflow import Overflow
 from mcap_landmarks.recording.record_shapes import check_attachment
 from mcap_landmarks.recording.summary_index import Block, Index, indexed_messages, read_record
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
@@ -161,7 +162,8 @@ class Recording:
     ) -> Iterator[RawMessage]:
         """Messages by log time, all or those of some connections, from `start_ns` on and before `end_ns`.
 
-        Holds only the chunks in memory that overlap in time. `progress` is told the bytes of each chunk that was read.
+        Holds only the chunks in memory that overlap in time, and of these no more than `Overflow` says. `progress` is
+        told the bytes of each chunk that was read.
         """
         wanted, first, last = self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns
         return chain.from_iterable(self._runs(wanted, (first, last), progress))
@@ -182,19 +184,21 @@ class Recording:
         wanted, first, last = self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns
         ids = frozenset(self._wanted(kept)) & wanted.keys()
         active: Open = []
-        for number, block in enumerate(self._blocks(wanted, first, last)):
-            yield from chain.from_iterable(drain(active, block.start_ns))
-            chunk = None
-            if first <= block.start_ns and block.end_ns < last:
-                chunk = read_whole(self._stream, block, ids, declared, verify=self._verify)
-            if chunk is not None:
-                yield from chain.from_iterable(drain(active, block.start_ns + 1))
-                if progress:
-                    progress(block.length)
-                yield chunk
-            else:
-                push(active, number, self._load(block, wanted, progress), first, last)
-        yield from chain.from_iterable(drain(active, 2**64))
+        with Overflow(self.path) as overflow:
+            for number, block in enumerate(self._blocks(wanted, first, last)):
+                yield from chain.from_iterable(drain(active, block.start_ns))
+                chunk = None
+                if first <= block.start_ns and block.end_ns < last:
+                    chunk = read_whole(self._stream, block, ids, declared, verify=self._verify)
+                if chunk is not None:
+                    yield from chain.from_iterable(drain(active, block.start_ns + 1))
+                    if progress:
+                        progress(block.length)
+                    yield chunk
+                else:
+                    found, size = self._load(block, wanted, progress)
+                    push(active, number, overflow.kept(active, number, found, size), first, last)
+            yield from chain.from_iterable(drain(active, 2**64))
 
     def blocks(self, connections: Collection[Connection]) -> list[Block] | None:
         """The blocks with messages of some connections, by their start; None if some hold messages of others, too."""
@@ -232,7 +236,12 @@ class Recording:
         ]
         return sorted(blocks, key=lambda block: (block.start_ns, block.offset))
 
-    def _load(self, block: Block, wanted: dict[int, Connection], progress: Progress | None) -> Sequence[RawMessage]:
+    def _load(
+        self, block: Block, wanted: dict[int, Connection], progress: Progress | None
+    ) -> tuple[Sequence[RawMessage], int]:
+        """The wanted messages of a block, and how many bytes they keep in memory."""
+        found: Sequence[RawMessage] = []
+        content = memoryview(b"")
         try:
             content = block_content(self._stream, block, verify=self._verify)
             found = messages_in(content, wanted) if is_small(content) else many_messages_in(content, wanted)
@@ -240,20 +249,21 @@ class Recording:
             self.damage = self.damage.with_suspect(
                 SuspectChunk(block.offset, indexed_messages(self._stream, block), str(error))
             )
-            found = []
         if progress:
             progress(block.length)
-        return found
+        return found, len(content)
 
     def _runs(
         self, wanted: dict[int, Connection], within_ns: tuple[int, int], progress: Progress | None
     ) -> Iterator[Iterable[RawMessage]]:
         """Messages in the order of time, in runs of one block; blocks may overlap."""
         active: Open = []
-        for number, block in enumerate(self._blocks(wanted, *within_ns)):
-            yield from drain(active, block.start_ns)
-            push(active, number, self._load(block, wanted, progress), *within_ns)
-        yield from drain(active, 2**64)
+        with Overflow(self.path) as overflow:
+            for number, block in enumerate(self._blocks(wanted, *within_ns)):
+                yield from drain(active, block.start_ns)
+                found, size = self._load(block, wanted, progress)
+                push(active, number, overflow.kept(active, number, found, size), *within_ns)
+            yield from drain(active, 2**64)
 
 
 def _connection(index: Index, channel: records.Channel) -> Connection:
