@@ -1,5 +1,7 @@
 """Maps travel through the thesis's text, CSV and JSON, and errors name file, line and what was expected."""
 
+import csv
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -113,6 +115,29 @@ def test_csv_keeps_the_confirmed_landmarks_to_the_bit() -> None:
         "id,class,x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2,radius_m,sightings",
         "a,fire hydrant,1.0,2.0,0.04,0.01,0.09,0.15,12",
     ]
+
+
+NAMES = ("=1+2", "+1", "-1", "@x", "\tx", "\rx", "'=x", "''-x", "'x", "x=1", "a,b", "\u96c6")
+
+
+def test_csv_has_no_formulas_and_gives_back_every_name() -> None:
+    """A spreadsheet shows what it opens as text, whatever a log called its objects; import takes the mark away."""
+    count = len(NAMES)
+    zeros = np.zeros(count)
+    numbers = (
+        np.full((count, 2), -1.5),
+        np.zeros((count, 2, 2)),
+        zeros,
+        zeros.astype(np.int64),
+        zeros.astype(np.bool_),
+    )
+    text = exchange_csv.render(LandmarkMap(NAMES, NAMES[::-1], *numbers))
+    rows = list(csv.reader(io.StringIO(text, newline="")))[1:]
+    assert not [cell for row in rows for cell in row[:2] if cell[0] in "=+-@\t\r"]
+    assert {row[2] for row in rows} == {"-1.5"}, "numbers stay numbers"
+    assert rows[8][0] == "'x", "what is no formula stays as it is"
+    found = exchange_csv.parse(text, "map.csv")
+    assert (found.ids, found.classes) == (NAMES, NAMES[::-1])
 
 
 def test_csv_needs_only_four_columns_in_any_order() -> None:

@@ -23,7 +23,8 @@ def show(
     if json:
         say_json("config_show", {"config": tables})
     else:
-        say(toml(tables).rstrip())
+        for line in toml(tables).rstrip().split("\n"):
+            say(line)
 
 
 @app.command()
@@ -33,4 +34,5 @@ def schema() -> None:
 
     from mcap_landmarks.runs.config_text import json_schema
 
-    say(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    for line in json.dumps(json_schema(), indent=2, ensure_ascii=False).split("\n"):
+        say(line)

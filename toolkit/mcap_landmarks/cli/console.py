@@ -4,6 +4,7 @@ import contextlib
 import json
 import math
 import os
+import re
 import signal
 import sys
 import threading
@@ -14,6 +15,9 @@ from mcap_landmarks.errors import ToolkitError
 
 DONE, UNUSABLE, USAGE, PARTIAL, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 """Exit codes: 2 is also what the shell's own tools mean by wrong usage, 130 and 143 its own of Ctrl-C and SIGTERM."""
+_HARMFUL = re.compile(r"[\0-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+"""What acts on a terminal or forges lines: control characters of both sets, those that turn the direction of writing
+(Unicode Standard Annex 9), line separators, and halves of pairs, which no encoding of text has."""
 _HELP = "see mcap-landmarks --help"
 _STOPPED = "interrupted; nothing unfinished was left behind, and the next run goes on from finished stages"
 
@@ -108,19 +112,28 @@ def _terminate(_number: int, _frame: FrameType | None) -> None:
     raise SystemExit(TERMINATED)
 
 
+def harmless(text: str) -> str:
+    """A line without the control characters that names out of files may hold: those that part words become spaces."""
+    return _HARMFUL.sub(lambda found: " " if found[0].isspace() else "", text)
+
+
 def warn(text: str) -> None:
     """One line on stderr."""
-    print(" ".join(text.split()), file=sys.stderr)
+    print(" ".join(harmless(text).split()), file=sys.stderr)
 
 
 def say(text: str = "") -> None:
-    """A result on stdout."""
-    print(text)
+    """One line of a result on stdout."""
+    print(harmless(text))
 
 
 def say_json(verb: str, document: Mapping[str, object]) -> None:
-    """The one document of `--json` on stdout; figures that are not finite become null, as JSON has none."""
-    print(json.dumps({"schema": f"mcap-landmarks/{verb}/1", **_plain_entries(document)}, indent=2, ensure_ascii=False))
+    """The one document of `--json` on stdout; figures that are not finite become null, as JSON has none.
+
+    Control characters in names are escaped, also those that JSON would let stand.
+    """
+    text = json.dumps({"schema": f"mcap-landmarks/{verb}/1", **_plain_entries(document)}, indent=2, ensure_ascii=False)
+    print(_HARMFUL.sub(lambda found: found[0] if found[0] == "\n" else f"\\u{ord(found[0]):04x}", text))
 
 
 def _plain_entries(entries: Mapping[str, object]) -> dict[str, object]:
@@ -139,6 +152,7 @@ def _plain(value: object) -> object:
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     """Columns on stdout: the first flush left, the others flush right."""
+    head, rows = [harmless(cell) for cell in head], [[harmless(cell) for cell in row] for row in rows]
     widths = [max(len(row[i]) for row in (head, *rows)) for i in range(len(head))]
     for row in (head, *rows):
         cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
@@ -177,7 +191,7 @@ def progress(label: str, total: int | None = None, unit: str = "bytes") -> Itera
     amount: list[ProgressColumn] = [DownloadColumn(), TransferSpeedColumn()]
     if unit != "bytes":
         amount = [MofNCompleteColumn(), TextColumn(unit), Rate()]
-    columns = [TextColumn("{task.description}"), BarColumn(), *amount, TimeRemainingColumn()]
+    columns = [TextColumn("{task.description}", markup=False), BarColumn(), *amount, TimeRemainingColumn()]
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=total)
+        task = bar.add_task(harmless(label), total=total)
         yield lambda advance: bar.update(task, advance=advance)

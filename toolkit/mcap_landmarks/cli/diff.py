@@ -119,9 +119,11 @@ def _print(document: "DiffDocument") -> None:
     _print_metrics(document["metrics"])
     if document["alignment"]:
         fit = document["alignment"]
-        say(f"\nbaseline from candidate: {fit['x_m']:.3f} m, {fit['y_m']:.3f} m, {fit['heading_deg']:.3f} deg")
+        say()
+        say(f"baseline from candidate: {fit['x_m']:.3f} m, {fit['y_m']:.3f} m, {fit['heading_deg']:.3f} deg")
     for entry in document["conditions"]:
-        say(f"\n{'fails' if entry['holds'] else 'holds not'}: {entry['condition']} (it is {_number(entry['value'])})")
+        say()
+        say(f"{'fails' if entry['holds'] else 'holds not'}: {entry['condition']} (it is {_number(entry['value'])})")
 
 
 def _print_rows(head: str, rows: Iterable[tuple[str, object, object]]) -> None:
@@ -145,7 +147,8 @@ def _print_counts(channels: "dict[str, ChannelEntry]") -> None:
 
 
 def _print_channel(name: str, channel: "ChannelEntry") -> None:
-    say(f"\n{name}")
+    say()
+    say(name)
     unit = channel["unit"].removesuffix("s")
     alone = [case for case in channel["worst"] if case["field"] == unit]
     _print_alone("removed", channel, [(case, case["baseline"]) for case in alone])
@@ -202,7 +205,8 @@ def _print_metrics(metrics: "dict[str, MetricEntry]") -> None:
         say()
         table(["metric", "baseline", "candidate", "change"], rows)
     elif metrics:
-        say("\nthe metrics are the same")
+        say()
+        say("the metrics are the same")
 
 
 def _differs(channel: "ChannelEntry") -> bool:

@@ -3,6 +3,8 @@
 import csv
 import hashlib
 import io
+import re
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,10 +13,15 @@ from mcap_landmarks.maps.model import LandmarkMap, MapSource
 
 NEEDED = ("id", "class", "x_m", "y_m")
 COLUMNS = (*NEEDED, "var_x_m2", "cov_xy_m2", "var_y_m2", "radius_m", "sightings")
+_FORMULA = re.compile(r"'*[=+\-@\t\r]")
+"""How a text begins that a spreadsheet takes for a formula (OWASP, CSV Injection), or that `_as_text` made of one."""
 
 
 def parse(text: str, name: str) -> LandmarkMap:
     """The map of a CSV text. Its first line names the columns; all after y_m may be left out, zero is unknown.
+
+    Of an id or class that begins with apostrophes and then as a formula does, the first apostrophe is taken away:
+    `render` put it there.
 
     Raises:
         MapError: with the name of the file, the line, and what was expected there.
@@ -47,22 +54,26 @@ def parse(text: str, name: str) -> LandmarkMap:
 
 
 def render(landmark_map: LandmarkMap) -> str:
-    """The confirmed landmarks of a map as CSV, numbers to the last bit."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    """The confirmed landmarks of a map as CSV, numbers to the last bit.
+
+    No spreadsheet runs anything of it: ids and classes that begin with = + - @, a tab or a carriage return, or with
+    apostrophes before these, get an apostrophe in front, which `parse` takes away again. Numbers stay numbers.
+    """
+    lines = [_line(COLUMNS)]
     spread = landmark_map.covariances
     for i in np.flatnonzero(~landmark_map.tentative):
         numbers = [*landmark_map.positions_xy[i], spread[i, 0, 0], spread[i, 0, 1], spread[i, 1, 1]]
-        writer.writerow(
-            [
-                landmark_map.ids[i],
-                landmark_map.classes[i],
-                *(repr(float(number)) for number in (*numbers, landmark_map.radii_m[i])),
-                int(landmark_map.sightings[i]),
-            ]
-        )
-    return stream.getvalue()
+        names = (_as_text(landmark_map.ids[i]), _as_text(landmark_map.classes[i]))
+        texts = [repr(float(number)) for number in (*numbers, landmark_map.radii_m[i])]
+        lines.append(_line([*names, *texts, str(int(landmark_map.sightings[i]))]))
+    return "".join(lines)
+
+
+def _line(cells: Sequence[str]) -> str:
+    """The cells as a line, those quoted that hold a part of any line break: csv looks for those of its own only."""
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\r\n").writerow(cells)
+    return stream.getvalue()[:-2] + "\n"
 
 
 Record = tuple[str, str, list[float]]
@@ -74,7 +85,15 @@ def _record(header: list[str], row: list[str], where: str) -> Record:
     fields = dict(zip(header, row, strict=True))
     if not fields["id"] or not fields["class"]:
         raise MapError(f"{where}: expected an id and a class, found none")
-    return fields["id"], fields["class"], _numbers(fields, where)
+    return _as_meant(fields["id"]), _as_meant(fields["class"]), _numbers(fields, where)
+
+
+def _as_text(name: str) -> str:
+    return f"'{name}" if _FORMULA.match(name) else name
+
+
+def _as_meant(cell: str) -> str:
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
 def _numbers(fields: dict[str, str], where: str) -> list[float]:
