@@ -5,6 +5,7 @@ from struct import error as struct_error
 from typing import ClassVar, Protocol, Self, TypeVar
 
 from rosbags.serde import SerdeError
+from rosbags.typesys.store import Typestore
 
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.messages.typestore import RosObject, typestore, typestore_in
@@ -46,8 +47,12 @@ def decode(message_type: type[M], data: bytes | memoryview, schema: str = "") ->
 
 def read_as(take: Callable[[RosObject], T], ros_type: str, data: bytes | memoryview, schema: str = "") -> T:
     """What `take` makes of a message of a type from CDR bytes; for the rest see `decode`."""
+    return read_with(typestore_in(ros_type, schema) if schema else typestore(), take, ros_type, data)
+
+
+def read_with(store: Typestore, take: Callable[[RosObject], T], ros_type: str, data: bytes | memoryview) -> T:
+    """The same by the definitions of a typestore."""
     try:
-        store = typestore_in(ros_type, schema) if schema else typestore()
         return take(store.deserialize_cdr(data, ros_type))
     except (SerdeError, struct_error, IndexError, ValueError, UnicodeDecodeError) as error:
         raise MessageError(f"{len(data)} bytes are not a {ros_type}: {error or type(error).__name__}") from error

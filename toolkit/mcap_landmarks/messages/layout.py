@@ -1,14 +1,16 @@
 """How messages lie in CDR, from any schema in ROS 2's language."""
 
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from struct import error as struct_error
 
 import numpy as np
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import TypesysError, get_types_from_msg
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from mcap_landmarks.errors import MessageError
+from mcap_landmarks.messages.codec import read_with
 from mcap_landmarks.messages.columns import Children, Kind, Moments, Numbers, Rows, Table, Text, Texts
 from mcap_landmarks.messages.definition_extent import FieldType, check_extent
 
@@ -19,7 +21,8 @@ _SCALARS = {
 }  # fmt: skip
 _BYTES = (np.dtype("<u1"), np.dtype("<i1"))
 _MOMENTS = frozenset({"builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"})
-_LITTLE_ENDIAN = b"\x00\x01"
+LITTLE_ENDIAN, BIG_ENDIAN = b"\x00\x01", b"\x00\x00"
+"""How the encapsulation of CDR begins."""
 Definition = Mapping[str, list[tuple[str, FieldType]]]
 _Flat = tuple[np.dtype[np.number], int, Kind]
 
@@ -27,6 +30,7 @@ _Flat = tuple[np.dtype[np.number], int, Kind]
 class Layout:
     """How messages of one type lie in CDR: `definition` are the fields of all types that it needs, by their names.
 
+    `parts` are what a message consists of, in the order of the bytes, `columns` the names of its table's columns.
     `stamped` says whether each message begins with a time stamp, in its bytes 4 to 12; `has_payload` whether it
     carries bytes of some other format, as images do.
 
@@ -35,22 +39,23 @@ class Layout:
     """
 
     def __init__(self, ros_type: str, schema: str) -> None:
-        self._type = ros_type
+        self.ros_type = ros_type
         try:
-            types = get_types_from_msg(schema, ros_type)
-            self.definition: Definition = {name: fields for name, (_, fields) in types.items()}
+            self._types = get_types_from_msg(schema, ros_type)
+            self.definition: Definition = {name: fields for name, (_, fields) in self._types.items()}
             check_extent(self.definition, ros_type)
-            parts = self._rows().parts
+            self.parts = tuple(self._rows().parts)
         except (TypesysError, KeyError, RecursionError, MessageError) as error:
             reason = error or type(error).__name__
             raise MessageError(f"{ros_type}: its schema cannot be understood ({reason})") from error
-        self.stamped = isinstance(next(iter(parts), None), Moments)
-        self.has_payload = any(isinstance(p, Numbers) and p.dtype in _BYTES and p.count is None for p in parts)
+        self.columns = tuple(self.table([]).columns)
+        self.stamped = isinstance(next(iter(self.parts), None), Moments)
+        self.has_payload = any(isinstance(p, Numbers) and p.dtype in _BYTES and p.count is None for p in self.parts)
 
     def begins(self, other: "Layout") -> bool:
         """Whether the other type has all fields of this one first, and perhaps more: as a message that has grown."""
-        own, others = self.definition[self._type], other.definition.get(self._type, ())
-        parts = {name: fields for name, fields in self.definition.items() if name != self._type}
+        own, others = self.definition[self.ros_type], other.definition.get(self.ros_type, ())
+        parts = {name: fields for name, fields in self.definition.items() if name != self.ros_type}
         same = all(other.definition.get(name) == fields for name, fields in parts.items())
         return same and list(others[: len(own)]) == list(own)
 
@@ -68,9 +73,26 @@ class Layout:
             raise MessageError("a message is cut") from error
         return rows.take(len(messages))
 
+    def in_little_endian(self, data: bytes) -> bytes:
+        """A message in big endian as one in little endian; every other as it is.
+
+        Raises:
+            MessageError: its bytes do not fit the schema.
+        """
+        if data[:2] != BIG_ENDIAN:
+            return data
+        store, name = self._store, self.ros_type
+        return read_with(store, lambda ros: bytes(store.serialize_cdr(ros, name, little_endian=True)), name, data)
+
+    @cached_property
+    def _store(self) -> Typestore:
+        store = get_typestore(Stores.EMPTY)
+        store.register(self._types)
+        return store
+
     def _rows(self) -> Rows:
         rows = Rows()
-        for name, node in self.definition[self._type]:
+        for name, node in self.definition[self.ros_type]:
             _add(rows, self.definition, node, name)
         return rows
 
@@ -82,7 +104,7 @@ def layout_of(ros_type: str, schema: str) -> Layout:
 
 
 def _read(rows: Rows, data: bytes) -> None:
-    if data[:2] != _LITTLE_ENDIAN:
+    if data[:2] != LITTLE_ENDIAN:
         raise MessageError(f"{len(data)} bytes are not CDR in little endian")
     left = len(data) - 4 - rows.read(data[4:], 0)
     if not 0 <= left < 4:

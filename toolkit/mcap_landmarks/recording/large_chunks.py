@@ -5,10 +5,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mcap_landmarks.memory import Lazily
+from mcap_landmarks.memory import Lazily, is_small
 from mcap_landmarks.recording.blocks import DamagedBlockError, records_in
+from mcap_landmarks.recording.chunk_messages import messages_in
 from mcap_landmarks.recording.container import MESSAGE, MESSAGE_FIXED, RECORD, Opcode
 from mcap_landmarks.stage import Connection, RawMessage
+
+
+def messages_of(wanted: Mapping[int, Connection], content: memoryview) -> tuple[Sequence[RawMessage], int]:
+    """The wanted channels' messages by log time, see `messages_in`, and how many bytes they keep in memory."""
+    return (messages_in if is_small(content) else many_messages_in)(content, wanted), len(content)
 
 
 def many_messages_in(content: memoryview, wanted: Mapping[int, Connection]) -> Sequence[RawMessage]:

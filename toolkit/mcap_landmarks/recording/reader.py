@@ -2,32 +2,34 @@
 
 import contextlib
 import hashlib
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextvars import ContextVar
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 from mcap import records
 from mcap.exceptions import McapError
 
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, STAGE, carried_fingerprint
-from mcap_landmarks.memory import is_small
+from mcap_landmarks.messages.layout import Layout
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.blocks import DamagedBlockError, block_content
+from mcap_landmarks.recording.channel_columns import BlockRows, ChannelColumns, Wanted, by_log_time, rows_in
 from mcap_landmarks.recording.chunk_copy import WholeChunk, read_whole
-from mcap_landmarks.recording.chunk_messages import Open, drain, messages_in, push
+from mcap_landmarks.recording.chunk_messages import Open, drain, push
 from mcap_landmarks.recording.container import CHUNK, RECORD, parse
 from mcap_landmarks.recording.damage import SuspectChunk
 from mcap_landmarks.recording.declared_channels import Declared
-from mcap_landmarks.recording.large_chunks import many_messages_in
+from mcap_landmarks.recording.large_chunks import messages_of
 from mcap_landmarks.recording.opening import index_of, open_stream
 from mcap_landmarks.recording.overflow import Overflow
 from mcap_landmarks.recording.record_shapes import check_attachment
 from mcap_landmarks.recording.summary_index import Block, Index, indexed_messages, read_record
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 
+T = TypeVar("T")
 _from_front: ContextVar[bool] = ContextVar("from_front", default=False)
 
 
@@ -82,7 +84,7 @@ class Recording:
         self.index, self.damage = index, index.damage
         self._stream, self._verify = stream, verify
         self._lost_attachments: list[str] = []
-        self._connections = {key: _connection(index, channel) for key, channel in sorted(index.channels.items())}
+        self._connections = {key: index.connection(key) for key in sorted(index.channels)}
         self._ids = {connection: key for key, connection in self._connections.items()}
         self.channels = tuple(
             ChannelSummary(connection, index.counts.get(key, 0)) for key, connection in self._connections.items()
@@ -168,6 +170,29 @@ class Recording:
         wanted, first, last = self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns
         return chain.from_iterable(self._runs(wanted, (first, last), progress))
 
+    def columns(
+        self,
+        connection: Connection,
+        layout: Layout,
+        fields: Collection[str] | None = None,
+        start_ns: int | None = None,
+        end_ns: int | None = None,
+        progress: Progress | None = None,
+    ) -> ChannelColumns:
+        """Some fields of a connection's messages, by default all; which, and in what order, as `messages` gives them.
+
+        `layout` is that of their type. One chunk is held in memory, and the columns.
+
+        Raises:
+            MessageError: the type has no such field.
+        """
+        within, key = (start_ns or 0, 2**64 if end_ns is None else end_ns), self._ids[connection]
+        asked, found = Wanted(key, layout, fields, within), list[BlockRows]()
+        for block in self._blocks({key: connection}, *within):
+            rows = self._take(block, partial(rows_in, self._stream, block, asked), progress)
+            found += [] if rows is None else [rows]
+        return by_log_time(found, asked)
+
     def pieces(
         self,
         connections: Collection[Connection],
@@ -240,18 +265,20 @@ class Recording:
         self, block: Block, wanted: dict[int, Connection], progress: Progress | None
     ) -> tuple[Sequence[RawMessage], int]:
         """The wanted messages of a block, and how many bytes they keep in memory."""
-        found: Sequence[RawMessage] = []
-        content = memoryview(b"")
+        return self._take(block, partial(messages_of, wanted), progress) or ([], 0)
+
+    def _take(self, block: Block, take: Callable[[memoryview], T], progress: Progress | None) -> T | None:
+        """What is made of a block's content; None if it is damaged, which the account then says."""
+        found = None
         try:
-            content = block_content(self._stream, block, verify=self._verify)
-            found = messages_in(content, wanted) if is_small(content) else many_messages_in(content, wanted)
+            found = take(block_content(self._stream, block, verify=self._verify))
         except DamagedBlockError as error:
             self.damage = self.damage.with_suspect(
                 SuspectChunk(block.offset, indexed_messages(self._stream, block), str(error))
             )
         if progress:
             progress(block.length)
-        return found, len(content)
+        return found
 
     def _runs(
         self, wanted: dict[int, Connection], within_ns: tuple[int, int], progress: Progress | None
@@ -264,15 +291,3 @@ class Recording:
                 found, size = self._load(block, wanted, progress)
                 push(active, number, overflow.kept(active, number, found, size), *within_ns)
             yield from drain(active, 2**64)
-
-
-def _connection(index: Index, channel: records.Channel) -> Connection:
-    schema = index.schemas.get(channel.schema_id)
-    return Connection(
-        channel.topic,
-        schema.name if schema else "",
-        schema.data if schema else b"",
-        schema.encoding if schema else "",
-        channel.message_encoding,
-        channel.metadata,
-    )

@@ -14,6 +14,7 @@ from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.container import FOOTER_SIZE, MAGIC, RECORD, Opcode, parse
 from mcap_landmarks.recording.damage import Damage
 from mcap_landmarks.recording.index_check import DistrustedIndexError, check_index
+from mcap_landmarks.stage import Connection
 
 MESSAGE_START = Struct("<HIQ")
 """The first fields of a message: channel, sequence, log time."""
@@ -56,6 +57,13 @@ class Index:
     start_ns: int | None = None
     end_ns: int | None = None
     damage: Damage = field(default_factory=Damage)
+
+    def connection(self, channel_id: int) -> Connection:
+        """A channel with its schema."""
+        channel = self.channels[channel_id]
+        schema = self.schemas.get(channel.schema_id)
+        name, content, encoding = (schema.name, schema.data, schema.encoding) if schema else ("", b"", "")
+        return Connection(channel.topic, name, content, encoding, channel.message_encoding, channel.metadata)
 
 
 def read_record(stream: BinaryIO, offset: int) -> tuple[int, bytes]:

@@ -1,0 +1,154 @@
+"""Columns of a channel's messages: found by the message indexes of their chunks, and gathered without a loop."""
+
+from array import array
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import BinaryIO, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcap_landmarks.messages.columns import Table
+from mcap_landmarks.messages.gathering import PlacedMessages, in_order, joined, read_placed
+from mcap_landmarks.messages.layout import Layout
+from mcap_landmarks.recording.blocks import DamagedBlockError, records_in
+from mcap_landmarks.recording.container import MESSAGE, MESSAGE_FIXED, RECORD, Opcode
+from mcap_landmarks.recording.summary_index import Block
+
+Indices = NDArray[np.int64]
+_HEAD = np.dtype(
+    [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")]
+)
+"""What messages begin with, as in `MESSAGE`."""
+_LATEST = np.uint64(2**63 - 1)
+Heads = NDArray[np.void]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChannelColumns:
+    """The columns of N messages of a channel by log time, and these times (N,) in ns: 2^63 - 1 stands for later ones.
+
+    `broken` counts the messages that do not fit their type, and have no row.
+    """
+
+    log_time_ns: Indices
+    publish_time_ns: Indices
+    table: Table
+    broken: int = 0
+
+
+class BlockRows(NamedTuple):
+    """What a block gives: log and publish times (N,), the columns, and how many messages could not be read."""
+
+    log: NDArray[np.uint64]
+    publish: NDArray[np.uint64]
+    table: Table
+    broken: int
+
+
+class Wanted(NamedTuple):
+    """Which messages are wanted: of a channel, from a log time on and before another; and what of them."""
+
+    channel_id: int
+    layout: Layout
+    fields: Collection[str] | None
+    within_ns: tuple[int, int]
+
+
+def rows_in(stream: BinaryIO, block: Block, asked: Wanted, content: memoryview) -> BlockRows:
+    """The rows of a block's wanted messages, in the order of the file.
+
+    Raises:
+        DamagedBlockError: a record runs over the end, or is too short for what it is.
+        MessageError: the type has no such field.
+    """
+    heads, starts = _messages(stream, block, content)
+    first_ns, last_ns = asked.within_ns
+    wanted = heads["channel"] == asked.channel_id
+    if block.start_ns < first_ns or block.end_ns >= last_ns:
+        wanted &= (heads["log"] >= np.uint64(first_ns)) & (heads["log"] <= np.uint64(last_ns - 1))
+    heads, starts = heads[wanted], starts[wanted]
+    sizes = heads["length"].astype(np.int64) - MESSAGE_FIXED
+    table, is_read = read_placed(asked.layout, PlacedMessages(content, starts + MESSAGE.size, sizes), asked.fields)
+    heads = heads[is_read]
+    return BlockRows(heads["log"], heads["publish"], table, len(is_read) - len(heads))
+
+
+def by_log_time(blocks: Sequence[BlockRows], asked: Wanted) -> ChannelColumns:
+    """The rows of blocks, which are by their start, in the order of log time; those of equal time keep their order."""
+    nothing = np.zeros(0, dtype=np.int64)
+    empty, _ = read_placed(asked.layout, PlacedMessages(memoryview(b""), nothing, nothing), asked.fields)
+    log, publish = (np.concatenate([nothing.astype(np.uint64), *(rows[i] for rows in blocks)]) for i in range(2))
+    table = joined([empty, *(rows.table for rows in blocks)])
+    if (log[1:] < log[:-1]).any():
+        order = np.argsort(log, kind="stable")
+        log, publish, table = log[order], publish[order], in_order(table, order)
+    broken = sum(rows.broken for rows in blocks)
+    return ChannelColumns(_signed(log), _signed(publish), table, broken)
+
+
+def _signed(times_ns: NDArray[np.uint64]) -> Indices:
+    return np.minimum(times_ns, _LATEST).astype(np.int64)
+
+
+def _messages(stream: BinaryIO, block: Block, content: memoryview) -> tuple[Heads, Indices]:
+    """The heads of all messages in a block's content (N,) and where they start, in the order of the file.
+
+    Those that the message indexes name, if there is no other message; else every record is looked at.
+    """
+    if (starts := _indexed(stream, block, content)) is not None:
+        heads = _heads(content, starts)
+        if _are_all(content, starts, heads):
+            return heads, starts
+    found = array("q")
+    for opcode, start, end in records_in(content):
+        if opcode == Opcode.MESSAGE:
+            if end - start < MESSAGE_FIXED:
+                raise DamagedBlockError("a message in it is cut")
+            found.append(start - RECORD.size)
+    starts = np.asarray(found)
+    return _heads(content, starts), starts
+
+
+def _heads(content: memoryview, starts: Indices) -> Heads:
+    nothing = np.zeros(len(starts), dtype=np.int64)
+    return PlacedMessages(content, starts, nothing).gather(0, np.dtype(f"V{_HEAD.itemsize}")).view(_HEAD)
+
+
+def _indexed(stream: BinaryIO, block: Block, content: memoryview) -> Indices | None:
+    """Where messages start that the message indexes behind a chunk name; None where there are none, or they cannot be.
+
+    Only the places are taken from there. What they say of channels and times stands with the messages.
+    """
+    if not block.is_chunk or block.is_cut or block.head:
+        return None
+    most, found = 6 + 16 * (len(content) // MESSAGE.size), [np.zeros(0, dtype=np.uint64)]
+    stream.seek(block.offset + block.length)
+    while len(head := stream.read(RECORD.size)) == RECORD.size:
+        opcode, length = RECORD.unpack(head)
+        if opcode != Opcode.MESSAGE_INDEX or not 6 <= length <= most or (length - 6) % 16:
+            break
+        if len(record := stream.read(length)) < length:
+            return None
+        found.append(np.frombuffer(record, "<u8", offset=6)[1::2])
+    offsets = np.sort(np.concatenate(found))
+    if not len(offsets) or offsets[-1] + np.uint64(MESSAGE.size) > len(content):
+        return None
+    return offsets.astype(np.int64)
+
+
+def _are_all(content: memoryview, starts: Indices, heads: Heads) -> bool:
+    """Whether records at these places are messages, do not overlap, and there is none between them."""
+    length = heads["length"]
+    if not ((heads["opcode"] == Opcode.MESSAGE) & (length >= MESSAGE_FIXED) & (length <= len(content))).all():
+        return False
+    ends = np.concatenate([[0], starts + RECORD.size + length.astype(np.int64)])
+    begins = np.concatenate([starts, [len(content)]])
+    if (begins < ends).any():
+        return False
+    gaps = np.flatnonzero(begins > ends)  # most often one, of the definitions at the chunk's begin
+    try:
+        between = [content[ends[gap] : begins[gap]] for gap in gaps.tolist()]
+        return all(opcode != Opcode.MESSAGE for piece in between for opcode, _, _ in records_in(piece))
+    except DamagedBlockError:
+        return False
