@@ -67,7 +67,7 @@ def _read(path: Path, above: tuple[Path, ...]) -> tuple[dict[str, object], dict[
     try:
         text = path.read_text()
         content = tomllib.loads(text)
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ToolkitError(f"{path}: not a TOML file: {error}") from error
     origins = {key_path: f"{path}:{line}" for key_path, line in lines_of(text).items()}
     base_name = content.pop("extends", None)
@@ -110,7 +110,7 @@ def _set(content: dict[str, object], origins: dict[KeyPath, str], text: str) -> 
         raise UsageError(f"--set {text}: write KEY=VALUE, such as camera.rate_hz=5")
     try:
         parsed = tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         parsed = value
     change: dict[str, object] = {keys[-1]: parsed}
     for key in reversed(keys[:-1]):

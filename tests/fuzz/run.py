@@ -12,7 +12,6 @@ import io
 import os
 import resource
 import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -100,8 +99,9 @@ def _fuzz(name: str, seconds: int, findings: Path) -> None:
     watched = Watched(name, folder / "work", findings)
     words = [
         f"-max_total_time={seconds}", f"-max_len={_LARGEST_INPUT}", "-timeout=60", "-rss_limit_mb=4096",
-        f"-artifact_prefix={findings}/{name}-crash-", "-print_final_stats=1", "-verbosity=1", "-handle_alrm=0",
+        f"-artifact_prefix={findings}/{name}-crash-", "-print_final_stats=1", "-handle_alrm=0",
     ]  # fmt: skip
+    print(f"TARGET {name}", flush=True)
     atheris.Setup([sys.argv[0], *words, str(folder / "corpus" / name)], watched)
     atheris.Fuzz()
 
@@ -131,9 +131,13 @@ def main() -> None:
     asked.findings.mkdir(parents=True, exist_ok=True)
     if asked.target:
         _fuzz(asked.target, max(1, int(asked.minutes * 60)), asked.findings.resolve())
+    with atheris.instrument_imports(include=_INSTRUMENTED, enable_loader_override=False):
+        import tests.fuzz.targets  # noqa: F401, PLC0415 - once for all
     for target in TARGETS:
-        call = [sys.executable, "-m", "tests.fuzz.run", "--target", target, "--findings", str(asked.findings)]
-        subprocess.run([*call, "--minutes", str(asked.minutes / len(TARGETS))], check=False)
+        child = os.fork()
+        if child == 0:
+            _fuzz(target, max(1, int(asked.minutes * 60 / len(TARGETS))), asked.findings.resolve())
+        os.waitpid(child, 0)
 
 
 if __name__ == "__main__":

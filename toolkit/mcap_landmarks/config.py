@@ -71,7 +71,7 @@ def _from_file(path: Location) -> Settings:
         tables = tomllib.loads(to_read(path).read_text())
     except FileNotFoundError as error:
         raise UsageError(f"{path}: there is no such configuration file; check the path") from error
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise UsageError(f"{path}: not a TOML file: {error}") from error
     for name, table in tables.items():
         if not isinstance(table, dict):
@@ -83,7 +83,7 @@ def _from_text(text: str) -> Settings:
     """Settings of one text; a value that is no TOML is taken for a string."""
     name, equals, value = text.partition("=")
     for written in (value, json.dumps(value)):
-        with contextlib.suppress(tomllib.TOMLDecodeError):
+        with contextlib.suppress(ValueError, RecursionError):
             tables = tomllib.loads(f"{name} = {written}")
             if equals and all(isinstance(table, dict) for table in tables.values()):
                 return tables

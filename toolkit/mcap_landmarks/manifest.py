@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import TypedDict
+from typing import TypedDict, TypeVar
 
 from mcap_landmarks import __version__
 from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.locations import Location, to_read
 
+_T = TypeVar("_T")
 RUN = "mcap-landmarks.run"
 """Name of the metadata record that holds the manifest."""
 GENERATE = "generate"
@@ -194,7 +195,13 @@ def stage_records(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, StageR
             record = StageRecord(name, config=config[name], outcome=outcome, **entry)
             if record.key == key:
                 found[name] = record
-    except (ValueError, KeyError, TypeError, AttributeError):  # of another version: nothing in it can be reused
+    except (
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+    ):  # of another version: nothing in it can be reused
         return {}
     return found
 
@@ -212,17 +219,28 @@ def carried_fingerprint(metadata: Mapping[str, Mapping[str, str]], content: str)
     """
     entries = metadata.get(RUN, {})
     text = entries.get("fingerprint")
-    return str(json.loads(text)) if text and entries.get(CONTENT) == entry_text(content) else None
+    return told(text, "") if text and entries.get(CONTENT) == entry_text(content) else None
 
 
 def told_losses(metadata: Mapping[str, Mapping[str, str]]) -> list[str]:
     """What of its input could not be read when an output was written."""
-    return [str(loss) for loss in json.loads(metadata.get(RUN, {}).get(LOSSES, "[]"))]
+    losses: list[object] = told(metadata.get(RUN, {}).get(LOSSES), [])
+    return [str(loss) for loss in losses]
 
 
 def told_carried(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, int]:
     """The number of messages, by topic, from before its start that an output carried over."""
-    return {str(topic): int(count) for topic, count in json.loads(metadata.get(RUN, {}).get(CARRIED, "{}")).items()}
+    counts: dict[str, object] = told(metadata.get(RUN, {}).get(CARRIED), {})
+    return {topic: count for topic, count in counts.items() if isinstance(count, int)}
+
+
+def told(text: str | None, otherwise: _T) -> _T:
+    """What an entry of a manifest says, of the type of `otherwise`; that where there is none or it is damaged."""
+    try:
+        value = json.loads(text or "")
+    except (ValueError, RecursionError):
+        return otherwise
+    return value if isinstance(value, type(otherwise)) else otherwise
 
 
 def narrowed(fingerprint: str, **limits: object) -> str:

@@ -1,6 +1,7 @@
 """Where the sensors sit on the robot: from the log's transforms, or from a file of extrinsics."""
 
 import json
+import sys
 import tomllib
 from collections.abc import Mapping
 
@@ -89,7 +90,7 @@ def read_extrinsics(path: Location) -> list[Edge]:
     try:
         text = to_read(path).read_text()
         content = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise UsageError(f"{path}: extrinsics cannot be read: {error}; write TOML or JSON") from error
     entries = content.get("transforms") if isinstance(content, Mapping) else None
     if not isinstance(entries, list) or not entries:
@@ -115,6 +116,6 @@ def _edge(path: Location, number: int, entry: object) -> Edge:
 def _numbers(where: str, entry: Mapping[str, object], key: str, count: int) -> Array:
     values = entry.get(key, [0.0] * count)
     numbers = values if isinstance(values, list) and len(values) == count else [None]
-    if not all(isinstance(value, int | float) and np.isfinite(value) for value in numbers):
+    if not all(isinstance(value, int | float) and abs(value) <= sys.float_info.max for value in numbers):
         raise UsageError(f"{where}: {key} = {values!r}; give {count} numbers")
     return np.array(numbers, dtype=np.float64)

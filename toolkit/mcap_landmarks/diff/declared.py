@@ -83,9 +83,9 @@ def _entries(record: Mapping[str, str]) -> dict[str, object]:
     for key, text in record.items():
         try:
             value = json.loads(text)
-        except ValueError:
-            value = text  # somebody else's manifest
-        _flatten(key, value, found)
+            _flatten(key, value, found)
+        except (ValueError, RecursionError):
+            found[key] = value = text  # somebody else's manifest
         if key == "stages" and (code := _code(value)):
             found["code"] = code
     return found

@@ -10,7 +10,7 @@ import zstandard
 
 from mcap_landmarks import memory
 from mcap_landmarks.recording.checksum import crc32
-from mcap_landmarks.recording.container import CHUNK, LARGEST_CHUNK, RECORD, Opcode
+from mcap_landmarks.recording.container import CHUNK, LARGEST_CHUNK, RECORD, Opcode, read_up_to
 from mcap_landmarks.recording.summary_index import Block
 
 
@@ -124,7 +124,7 @@ def block_content(stream: BinaryIO, block: Block, *, verify: bool) -> memoryview
         DamagedBlockError: the block cannot be trusted.
     """
     stream.seek(block.offset)
-    raw = stream.read(block.length)
+    raw = read_up_to(stream, block.length)
     if len(raw) < block.length:
         raise DamagedBlockError("the file ends within it")
     if block.head:

@@ -11,7 +11,7 @@ from mcap.exceptions import McapError
 from numpy.typing import NDArray
 
 from mcap_landmarks.recording.blocks import DamagedBlockError, chunk_content, records_in
-from mcap_landmarks.recording.container import CHUNK, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, parse
+from mcap_landmarks.recording.container import CHUNK, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, parse, read_up_to
 from mcap_landmarks.recording.declared_channels import Declared
 from mcap_landmarks.recording.summary_index import Block
 
@@ -55,7 +55,7 @@ def read_whole(
     if not block.is_chunk or block.is_cut or block.head or not (block.channel_ids is None or block.channel_ids <= ids):
         return None
     stream.seek(block.offset)
-    record = stream.read(block.length)
+    record = read_up_to(stream, block.length)
     try:
         chunk = _whole(record, {key: index for key, index in _read_indexes(stream).items() if len(index) > _INDEX_HEAD})
         content = chunk_content(memoryview(record)[RECORD.size :], verify=verify)
@@ -92,7 +92,7 @@ def _read_indexes(stream: BinaryIO) -> dict[int, bytes]:
         opcode, length = RECORD.unpack(head) if len(head) == RECORD.size else (0, 0)
         if opcode != Opcode.MESSAGE_INDEX:
             return indexes
-        index = head + stream.read(length)
+        index = head + read_up_to(stream, length)
         channel_id = int.from_bytes(index[RECORD.size : RECORD.size + 2], "little")
         entries = int.from_bytes(index[_INDEX_HEAD - 4 : _INDEX_HEAD], "little")
         if channel_id in indexes or len(index) != RECORD.size + length or len(index) != _INDEX_HEAD + entries:

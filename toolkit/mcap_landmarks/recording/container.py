@@ -1,8 +1,8 @@
 """The bytes of MCAP that the hot paths read and write themselves; everything else is left to mcap.records."""
 
-from io import BytesIO
+from io import SEEK_END, BytesIO
 from struct import Struct
-from typing import TypeVar
+from typing import BinaryIO, TypeVar
 
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.opcode import Opcode
@@ -17,7 +17,19 @@ FOOTER_SIZE = RECORD.size + 20
 LARGEST_CHUNK = 1 << 30
 """A chunk that claims to be larger is taken for damage, and not allocated: recorders write chunks of a few MB."""
 
+_AT_ONCE = 1 << 20
+"""So many bytes are asked of a file without a look at how many it has left."""
+
 R = TypeVar("R", bound=McapRecord)
+
+
+def read_up_to(stream: BinaryIO, size: int) -> bytes:
+    """So many bytes, fewer at the end of the file: Python would allocate all that a damaged length claims."""
+    if size > _AT_ONCE:
+        here = stream.tell()
+        size = min(size, stream.seek(0, SEEK_END) - here)
+        stream.seek(here)
+    return stream.read(max(size, 0))
 
 
 def parse(record: type[R], content: bytes | memoryview) -> R:
@@ -45,5 +57,6 @@ __all__ = [
     "RECORD",
     "Opcode",
     "parse",
+    "read_up_to",
     "serialize",
 ]

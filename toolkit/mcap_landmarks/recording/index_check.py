@@ -5,7 +5,7 @@ from typing import BinaryIO
 
 from mcap import records
 
-from mcap_landmarks.recording.container import CHUNK, RECORD, Opcode
+from mcap_landmarks.recording.container import CHUNK, RECORD, Opcode, read_up_to
 from mcap_landmarks.recording.record_shapes import ReadAt, fits, head_at
 
 _BETWEEN = {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA, Opcode.DATA_END}
@@ -34,7 +34,7 @@ def check_index(
 
     def read(offset: int, size: int) -> bytes:
         stream.seek(offset)
-        return stream.read(size)
+        return read_up_to(stream, size)
 
     offset, end = data
     unverified = 0

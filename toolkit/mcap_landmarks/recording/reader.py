@@ -19,7 +19,7 @@ from mcap_landmarks.recording.blocks import DamagedBlockError, block_content
 from mcap_landmarks.recording.channel_columns import BlockRows, ChannelColumns, Wanted, by_log_time, rows_in
 from mcap_landmarks.recording.chunk_copy import WholeChunk, read_whole
 from mcap_landmarks.recording.chunk_messages import Open, drain, push
-from mcap_landmarks.recording.container import CHUNK, RECORD, parse
+from mcap_landmarks.recording.container import CHUNK, RECORD, parse, read_up_to
 from mcap_landmarks.recording.damage import SuspectChunk
 from mcap_landmarks.recording.declared_channels import Declared
 from mcap_landmarks.recording.large_chunks import messages_of
@@ -130,7 +130,7 @@ class Recording:
             elif block.is_chunk:  # times, size and CRC stand for the content, which need not be read
                 digest.update(self._stream.read(RECORD.size + CHUNK.size)[RECORD.size :])
             else:
-                digest.update(self._stream.read(block.length))
+                digest.update(read_up_to(self._stream, block.length))
         return digest.hexdigest()
 
     def content_hash(self) -> str | None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 from mcap_landmarks.recording.blocks import DamagedBlockError, chunk_content, records_in
-from mcap_landmarks.recording.container import LARGEST_CHUNK, MAGIC, RECORD, Opcode
+from mcap_landmarks.recording.container import LARGEST_CHUNK, MAGIC, RECORD, Opcode, read_up_to
 from mcap_landmarks.recording.record_shapes import SHAPES, ReadAt, fits, head_at
 
 _HEAD = re.compile(rb"[\x01-\x0f].{5}\x00\x00\x00", re.DOTALL)
@@ -41,7 +41,7 @@ class Resync:
     def read(self, offset: int, size: int) -> bytes:
         """See `ReadAt`."""
         self.stream.seek(offset)
-        return self.stream.read(size)
+        return read_up_to(self.stream, size)
 
     def next(self, offset: int) -> int | None:
         """The first place from an offset on where a record stands, None if there is none."""
@@ -120,6 +120,6 @@ def reader_of(stream: BinaryIO) -> ReadAt:
 
     def read(offset: int, size: int) -> bytes:
         stream.seek(offset)
-        return stream.read(size)
+        return read_up_to(stream, size)
 
     return read

@@ -11,7 +11,7 @@ from mcap import records
 from mcap.exceptions import McapError
 
 from mcap_landmarks.recording.checksum import crc32
-from mcap_landmarks.recording.container import FOOTER_SIZE, MAGIC, RECORD, Opcode, parse
+from mcap_landmarks.recording.container import FOOTER_SIZE, MAGIC, RECORD, Opcode, parse, read_up_to
 from mcap_landmarks.recording.damage import Damage
 from mcap_landmarks.recording.index_check import DistrustedIndexError, check_index
 from mcap_landmarks.stage import Connection
@@ -77,7 +77,7 @@ def read_record(stream: BinaryIO, offset: int) -> tuple[int, bytes]:
     if len(head) < RECORD.size:
         raise EOFError
     opcode, length = RECORD.unpack(head)
-    content = stream.read(length)
+    content = read_up_to(stream, length)
     if len(content) < length:
         raise EOFError
     return opcode, content

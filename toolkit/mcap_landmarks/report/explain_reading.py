@@ -1,7 +1,6 @@
 """One bundle of a log with results and all that led to it, for an explanation."""
 
 import contextlib
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain, islice
@@ -38,7 +37,7 @@ from mcap_landmarks.lidar.beams import echoes
 from mcap_landmarks.lidar.scan_repair import ScanTopic
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.locations import Location
-from mcap_landmarks.manifest import RUN, stage_records
+from mcap_landmarks.manifest import RUN, stage_records, told
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.codec import M, Message, decode
 from mcap_landmarks.messages.detections import Detections
@@ -203,10 +202,11 @@ def _situation(recording: Recording, found: _Around, stamp_ns: int) -> Situation
 
 def _config(recording: Recording, config: type[_C], stage: str) -> _C:
     """What a stage ran with, as the log tells; the defaults for what it does not tell, or tells in other words."""
-    told = json.loads(recording.metadata.get(RUN, {}).get("config", "{}")).get(stage, {})
-    names = set(config.__dataclass_fields__)
-    with contextlib.suppress(UsageError):
-        return stage_config(config, stage, {name: told[name] for name in names & set(told)})
+    given: dict[str, object] = told(recording.metadata.get(RUN, {}).get("config"), {})
+    settings = given.get(stage)
+    if isinstance(settings, dict):
+        with contextlib.suppress(UsageError):
+            return stage_config(config, stage, {k: settings[k] for k in config.__dataclass_fields__ if k in settings})
     return config()
 
 

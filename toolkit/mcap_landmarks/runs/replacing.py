@@ -157,8 +157,11 @@ def _agree(entries: Mapping[str, str], made: Mapping[str, str | None]) -> bool:
 
 def _in_any_order(text: str | None) -> object:
     """The value of an entry; of logs that were named in another order the same is made."""
-    value = json.loads(text) if text is not None else None
-    return sorted(value) if isinstance(value, list) else value
+    try:
+        value = json.loads(text) if text is not None else None
+    except (ValueError, RecursionError):
+        return text
+    return sorted(value, key=entry_text) if isinstance(value, list) else value
 
 
 def _identity(place: Location) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
+from itertools import accumulate
 from pathlib import Path, PurePosixPath
 
 from ruamel.yaml import YAML
@@ -11,6 +12,8 @@ from mcap_landmarks.sources._ros2_types import known_distribution
 from mcap_landmarks.sources._shape import BagDescription
 
 METADATA = "metadata.yaml"
+_LONGEST, _DEEPEST = 4 << 20, 100
+"""Characters, of which rosbag2 writes some 200 for a file and 500 for a topic, and brackets within each other."""
 _RECORD, _KEY, _ROOT = "rosbag2", "serialized_metadata", "rosbag2_bagfile_information"
 
 
@@ -29,10 +32,15 @@ def recorded_metadata(records: Mapping[str, Mapping[str, str]]) -> BagDescriptio
     return described(records.get(_RECORD, {}).get(_KEY, "")) or BagDescription()
 
 
+def _is_nested(text: str) -> bool:
+    """Whether brackets stand in each other more often than anybody writes: each costs the parser all those before."""
+    return max(accumulate({"[": 1, "{": 1, "]": -1, "}": -1}.get(sign, 0) for sign in text)) > _DEEPEST
+
+
 @lru_cache(maxsize=16)
 def described(text: str) -> BagDescription | None:
     """What a text says, as in metadata.yaml or without its root as in MCAP; None if it is none such."""
-    if not text.strip():
+    if not text.strip() or len(text) > _LONGEST or _is_nested(text):
         return None
     try:
         document = YAML(typ="base", pure=True).load(text)  # every value as it is written: custom data are texts

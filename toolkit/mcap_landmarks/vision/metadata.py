@@ -19,7 +19,7 @@ def literal(path: Location, metadata: Mapping[str, str], key: str) -> object:
         return None
     try:
         return ast.literal_eval(text)
-    except (ValueError, SyntaxError) as error:
+    except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError) as error:
         raise ModelError(f"{path}: {key} in the metadata is {text[:60]!r}; export the model again") from error
 
 
