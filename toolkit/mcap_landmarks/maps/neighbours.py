@@ -1,13 +1,16 @@
 """Landmarks that stand near each other: the part of a search index that is found once and kept with a large map."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.maps.model import LandmarkMap
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 Ints = NDArray[np.int64]
 Rows = NDArray[np.int32]
@@ -31,12 +34,14 @@ class Neighbours:
     @classmethod
     def of_map(cls, landmark_map: LandmarkMap) -> "Neighbours":
         """Of the confirmed landmarks of a map."""
+        from scipy.spatial import cKDTree  # noqa: PLC0415 - takes a third of a second, and most verbs need none
+
         rows, _, class_of = confirmed(landmark_map)
         positions = landmark_map.positions_xy[rows]
         return cls.of(cKDTree(positions, balanced_tree=False), positions, class_of)
 
     @classmethod
-    def of(cls, places: cKDTree, positions_xy: Array, class_of: Ints) -> "Neighbours":
+    def of(cls, places: "cKDTree", positions_xy: Array, class_of: Ints) -> "Neighbours":
         """Of landmarks at positions (N, 2), which the tree `places` holds, with class numbers (N,)."""
         near = _neighbours(places, positions_xy)
         return cls(_canonical(_triangles(near), positions_xy, class_of), _pairs(near, class_of))
@@ -51,7 +56,7 @@ def confirmed(landmark_map: LandmarkMap) -> tuple[Ints, tuple[str, ...], Ints]:
     return rows, tuple(names), np.fromiter(map(number.__getitem__, classes), dtype=np.int64, count=len(classes))
 
 
-def _neighbours(places: cKDTree, positions: Array) -> Ints:
+def _neighbours(places: "cKDTree", positions: Array) -> Ints:
     """The nearest landmarks (N, K) of each, nearest first."""
     n = len(positions)
     count = min(n - 1, max(_NEAREST, int(np.sqrt(2 * SMALL_MAP / n))))

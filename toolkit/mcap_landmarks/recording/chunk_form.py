@@ -1,6 +1,7 @@
 """How the chunks of a recording look: how large they are, and how they are compressed."""
 
 from array import array
+from collections import defaultdict
 from dataclasses import dataclass, field
 
 CHUNK_BYTES = 1 << 20
@@ -29,4 +30,4 @@ class OpenChunk:
     data: bytearray = field(default_factory=bytearray)
     start_ns: int = 2**64 - 1
     end_ns: int = 0
-    index: "dict[int, array[int]]" = field(default_factory=dict)
+    index: "defaultdict[int, array[int]]" = field(default_factory=lambda: defaultdict(lambda: array("Q")))

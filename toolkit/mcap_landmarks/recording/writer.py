@@ -3,7 +3,6 @@
 import contextlib
 import hashlib
 import sys
-from array import array
 from collections.abc import Iterable, Iterator, Mapping
 from struct import Struct
 from typing import BinaryIO
@@ -137,10 +136,7 @@ class RecordingWriter:
             chunk = self._chunks[group] = OpenChunk(
                 compressed=self._form.compresses(is_image=group.startswith("image "))
             )
-        data = chunk.data
-        entries = chunk.index.get(channel_id)
-        if entries is None:
-            entries = chunk.index[channel_id] = array("Q")
+        data, entries = chunk.data, chunk.index[channel_id]
         entries.append(time_ns)
         entries.append(len(data))
         data += MESSAGE.pack(_MESSAGE, MESSAGE_FIXED + len(payload), channel_id, sequence, time_ns, publish_time_ns)

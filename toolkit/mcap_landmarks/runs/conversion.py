@@ -18,6 +18,7 @@ from mcap_landmarks.recording.latched import carried_note
 from mcap_landmarks.recording.writer import ROS2, RecordingWriter, create_recording, profile_of
 from mcap_landmarks.runs.bag_record import bag_record, custom_data_of
 from mcap_landmarks.runs.conversion_inputs import ConversionInputs
+from mcap_landmarks.runs.input_hashes import HashOf
 from mcap_landmarks.runs.loss_report import REPORT, loss_report
 from mcap_landmarks.runs.rosbag2_metadata import RECORD
 from mcap_landmarks.sources import OmittedTopic, definition_files
@@ -61,9 +62,9 @@ class Job:
     """
 
     def __init__(
-        self, inputs: ConversionInputs, hashes: Mapping[Path, str], form: ChunkForm | None = None, verb: str = "convert"
+        self, inputs: ConversionInputs, hash_of: HashOf, form: ChunkForm | None = None, verb: str = "convert"
     ) -> None:
-        self.inputs, self._hashes, self._form, self._verb = inputs, hashes, form, verb
+        self.inputs, self._hash_of, self._form, self._verb = inputs, hash_of, form, verb
         self._read: Counter[Connection] = Counter()
 
     def run(self, target: Path, advance: Progress) -> Converted:
@@ -90,7 +91,7 @@ class Job:
         profile = profile_of(self.inputs.connections)
         if profile != ROS2:
             done.notes.append(_told_others(self.inputs.connections))
-        with create_recording(target, self._metadata(), profile=profile, form=self._form) as writer:
+        with create_recording(target, self._carried(), profile=profile, form=self._form) as writer:
             kept = self.inputs.declare(writer, by_chunk=self._form is None)
             _put(writer, chain(carried, self.inputs.pieces(writer, kept, span, advance)))
             counts = {connection: writer.count(connection) for connection in self.inputs.connections}
@@ -98,6 +99,7 @@ class Job:
             done.declared = done.topics.total()
             if done.declared == len(carried):
                 raise NoMessagesError(f"{self.inputs.where}: {self._why_nothing()}")
+            writer.metadata[RUN] = self._manifest().entries()
             if carried:
                 on_topics = Counter(raw.connection.topic for raw in carried)
                 done.notes.append(carried_note(on_topics))
@@ -150,20 +152,22 @@ class Job:
         dropped = [f"{reason} ({count})" for log in self.inputs.logs for reason, count in log.dropped.items()]
         return "; ".join(dropped) or "there are no messages in it; choose another log, or other --topics"
 
-    def _metadata(self) -> Mapping[str, Mapping[str, str]]:
-        """The inputs' metadata records, where these stay true, and the manifest."""
+    def _carried(self) -> Mapping[str, Mapping[str, str]]:
+        """The inputs' metadata records, where these stay true."""
         carried: dict[str, Mapping[str, str]] = {}
         for part in self.inputs.parts:
             if isinstance(part, McapLog):
                 carried.update({name: entries for name, entries in part.metadata.items() if name not in _LOST_WITH})
-        manifest = Manifest(
+        return carried
+
+    def _manifest(self) -> Manifest:
+        return Manifest(
             verb=self._verb,
             config={log.source: _set(log) for log in self.inputs.logs},
-            inputs=tuple(self._hashes[log.path] for log in self.inputs.logs),
+            inputs=tuple(self._hash_of(log.path) for log in self.inputs.logs),
             options=self.inputs.selection.options(),
             generated=all(isinstance(part, McapLog) and is_generated(part.metadata) for part in self.inputs.parts),
         )
-        return {**carried, RUN: manifest.entries()}
 
 
 def _put(writer: RecordingWriter, pieces: Iterable[RawMessage | WholeChunk]) -> None:

@@ -1,24 +1,22 @@
 """Convert bags and data sets to MCAP: every message that the storage declares arrives, or its loss is told."""
 
 import contextlib
-import hashlib
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from mcap_landmarks.config import Settings
-from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
+from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.inspection.open_logs import OpenLog, open_logs
 from mcap_landmarks.locations import Location, to_write
-from mcap_landmarks.manifest import file_hash
 from mcap_landmarks.progress import Progress, Watch
 from mcap_landmarks.recording.chunk_form import ChunkForm
-from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.runs.conversion import Converted, Job
 from mcap_landmarks.runs.conversion_inputs import ConversionInputs
+from mcap_landmarks.runs.input_hashes import HashOf, input_hashes
 from mcap_landmarks.runs.outputs import make_folder, no_empty_folder, output_files
-from mcap_landmarks.runs.replacing import Replacing, check_apart, earlier_recording, output_to
+from mcap_landmarks.runs.replacing import IsEarlier, Replacing, check_apart, earlier_recording, output_to
 from mcap_landmarks.runs.split_outputs import write_parts
 from mcap_landmarks.runs.splitting import Split
 from mcap_landmarks.runs.topic_selection import Selection
@@ -77,12 +75,11 @@ def convert(
         check_apart(plan, [*inputs, *beside])
         if there.suffix in _OTHER_FORMATS and there in plan:
             raise UsageError(f"{there}: convert writes MCAP; name the output {there.stem}.mcap, or give a folder")
-        hashes = {path: _content_hash(path, watch) for path in dict.fromkeys(log.path for log in logs)}
+        hash_of = stack.enter_context(input_hashes(log.path for log in logs))
         for target, group in plan.items():
-            earlier = earlier_recording(verb, [hashes[log.path] for log in group])
             try:
-                job = Job(ConversionInputs(group, selection, strict=strict), hashes, form.chunks, verb)
-                replacing = Replacing(earlier, overwrite)
+                job = Job(ConversionInputs(group, selection, strict=strict), hash_of, form.chunks, verb)
+                replacing = Replacing(_earlier(verb, group, hash_of), overwrite)
                 with watch(f"{verb} to {target.name}", sum(log.size_bytes for log in group)) as advance:
                     conversion.outputs += _written(job, target, form, replacing, advance)
             except ToolkitError as error:
@@ -96,6 +93,15 @@ def _check_once(inputs: Sequence[Location]) -> None:
     for place, count in Counter(inputs).items():
         if count > 1:
             raise UsageError(f"{place} is given {count} times; name each input once")
+
+
+def _earlier(verb: str, logs: Sequence[OpenLog], hash_of: HashOf) -> IsEarlier:
+    """See `earlier_recording`; it waits for the hashes only where there is a file."""
+
+    def is_earlier(path: Path) -> bool:
+        return earlier_recording(verb, [hash_of(log.path) for log in logs])(path)
+
+    return is_earlier
 
 
 def _written(job: Job, target: Path, form: OutputForm, replacing: Replacing, advance: Progress) -> list[Converted]:
@@ -128,19 +134,3 @@ def _in_folder(names: Sequence[Path], folder: Path) -> list[Path]:
     if len(set(targets)) < len(targets):
         raise UsageError(f"{folder}: two inputs would write {targets[-1].name}; convert them into two folders")
     return targets
-
-
-def _content_hash(path: Path, watch: Watch) -> str:
-    """SHA-256 of a file, or of the names and hashes of a folder's files; of a recording, over its CRCs."""
-    if path.suffix == ".mcap" and path.is_file():
-        with contextlib.suppress(RecordingError), open_recording(path) as recording:
-            found = recording.content_hash()
-            if found is not None:
-                return found
-    files = [path] if path.is_file() else sorted(file for file in path.rglob("*") if file.is_file())
-    with watch(f"hash {path.name}", sum(file.stat().st_size for file in files)) as advance:
-        hashes = [file_hash(file, advance) for file in files]
-    if path.is_file():
-        return hashes[0]
-    lines = [f"{file.relative_to(path).as_posix()} {hash_}\n" for file, hash_ in zip(files, hashes, strict=True)]
-    return hashlib.sha256("".join(lines).encode()).hexdigest()

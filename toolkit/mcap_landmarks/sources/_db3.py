@@ -40,12 +40,17 @@ _Row = tuple[int, int, int, bytes]  # time, row id, topic id, data
 _Key = tuple[int, int]  # time, row id
 
 
-def unpacked(data: Payload) -> Payload:
-    """A payload without the compression that a bag may have put on each message; CDR never begins like zstd.
+def unpacker() -> Callable[[Payload], Payload]:
+    """What takes off the compression that a bag may have put on each message; CDR never begins like zstd.
 
-    Raises:
-        MessageError: it is compressed and damaged.
+    It raises MessageError where that is damaged. Each has a decompressor, which takes longer to make than to use, and
+    serves one thread at a time.
     """
+    decompressor = zstandard.ZstdDecompressor()
+    return lambda data: _unpacked(data, decompressor)
+
+
+def _unpacked(data: Payload, decompressor: zstandard.ZstdDecompressor) -> Payload:
     if data[:4] != ZSTD_MAGIC:
         return data
     try:
@@ -54,7 +59,7 @@ def unpacked(data: Payload) -> Payload:
             return _unpacked_in_pieces(data)
         if problem := memory.excess(size, len(data)):
             raise MessageError(f"{len(data)} bytes are not decompressed: {problem}")
-        return zstandard.ZstdDecompressor().decompress(data)
+        return decompressor.decompress(data)
     except (zstandard.ZstdError, MemoryError) as error:
         raise MessageError(f"{len(data)} bytes cannot be decompressed ({error})") from error
 
@@ -81,6 +86,7 @@ class Db3Log:
         self.losses: list[str] = []
         self.left_out: list[OmittedTopic] = []
         self._path = path
+        self._unpacked = unpacker()
         try:
             with _database(path) as database:
                 self._read_topics(database, definitions)
@@ -130,7 +136,7 @@ class Db3Log:
         for _, _, key, data in self._ordered(_FIRST, _LAST):
             if key in keys and isinstance(data, bytes):
                 with contextlib.suppress(MessageError):
-                    yield key, unpacked(data)
+                    yield key, self._unpacked(data)
 
     def _leave_out(self, key: int, topic: str, message_type: str, reason: str) -> None:
         if self._counts[key]:
@@ -178,17 +184,18 @@ class Db3Log:
         first, end = _FIRST if start_ns is None else start_ns, _LAST if end_ns is None else end_ns
         read = 0
         for time_ns, _, key, data in self._ordered(first, end):
-            if not isinstance(data, bytes) or _number(time_ns) != time_ns:
+            if type(data) is not bytes or type(time_ns) is not int or time_ns < 0:
                 self._lose("rows without a sound time and payload are left out")
                 continue
             read += len(data)
             if progress and read >= _REPORT_BYTES:
                 progress(read)
                 read = 0
-            if key in wanted:
-                payload = self._payload(wanted[key], data)
+            connection = wanted.get(key)
+            if connection is not None:
+                payload = self._payload(connection, data) if data.startswith(ZSTD_MAGIC) else data
                 if payload is not None:
-                    yield RawMessage(wanted[key], time_ns, time_ns, 0, payload)
+                    yield RawMessage(connection, time_ns, time_ns, 0, payload)
         if progress:
             progress(read)
 
@@ -198,22 +205,22 @@ class Db3Log:
 
     def _payload(self, connection: Connection, data: bytes) -> Payload | None:
         try:
-            return unpacked(data)
+            return self._unpacked(data)
         except MessageError as error:
             self._lose(f"{connection.topic}: {error}; such messages are left out")
             return None
 
     def _ordered(self, first_ns: int, end_ns: int) -> Iterator[_Row]:
         """Rows by time, from the file's index while it lasts, from the rows themselves where that is damaged."""
-        last: _Key = (first_ns, _FIRST)
+        last: _Row = (first_ns, _FIRST, 0, b"")
         with _database(self._path) as database:
             try:
                 for row in _by_time(database, first_ns, end_ns):
                     yield row
-                    last = row[:2]
+                    last = row
             except sqlite3.DatabaseError as error:
                 self._damaged(error)
-                yield from _salvaged(database, last, end_ns)
+                yield from _salvaged(database, last[:2], end_ns)
 
 
 @contextlib.contextmanager

@@ -7,7 +7,7 @@ from mcap_landmarks.errors import MessageError
 from mcap_landmarks.messages.qos import KEY, qos_profile
 from mcap_landmarks.messages.typestore import full_name
 from mcap_landmarks.sources._bag_metadata import recorded_metadata
-from mcap_landmarks.sources._db3 import unpacked
+from mcap_landmarks.sources._db3 import unpacker
 from mcap_landmarks.sources._definition_text import decoded
 from mcap_landmarks.sources._definitions import Definitions
 from mcap_landmarks.sources._foxglove import carry_foxglove
@@ -27,7 +27,7 @@ def carry(definitions: Definitions, connection: Connection, records: Mapping[str
     if connection.message_encoding == "cdr":
         metadata = {KEY: "", **connection.metadata}
         kept = Connection(topic, full_name(connection.message_type), connection.schema, encoding, metadata=metadata)
-        return Carried(kept, unpacked) if connection.schema.strip() else _undefined(kept, definitions, records)
+        return Carried(kept, unpacker()) if connection.schema.strip() else _undefined(kept, definitions, records)
     if connection.message_encoding != "ros1" or encoding != "ros1msg":
         return Carried(replace(connection), lambda data: data)
     metadata = {KEY: qos_profile(latched=connection.metadata.get("latching") in {"1", "true"})}
@@ -44,4 +44,4 @@ def _undefined(connection: Connection, definitions: Definitions, records: Mappin
     if not message_type:
         raise MessageError("the file does not say of which type its messages are")
     found = definitions.also(about.distribution).of(message_type)
-    return Carried(defined(replace(connection, message_type=message_type), found[0]), unpacked, definitions=found)
+    return Carried(defined(replace(connection, message_type=message_type), found[0]), unpacker(), definitions=found)
