@@ -182,22 +182,21 @@ class Db3Log:
         """See `Log`."""
         wanted = self._wanted(connections)
         first, end = _FIRST if start_ns is None else start_ns, _LAST if end_ns is None else end_ns
-        read = 0
+        tell, read = progress or (lambda _read: None), 0
         for time_ns, _, key, data in self._ordered(first, end):
             if type(data) is not bytes or type(time_ns) is not int or time_ns < 0:
                 self._lose("rows without a sound time and payload are left out")
                 continue
             read += len(data)
-            if progress and read >= _REPORT_BYTES:
-                progress(read)
+            if read >= _REPORT_BYTES:
+                tell(read)
                 read = 0
             connection = wanted.get(key)
             if connection is not None:
                 payload = self._payload(connection, data) if data.startswith(ZSTD_MAGIC) else data
                 if payload is not None:
                     yield RawMessage(connection, time_ns, time_ns, 0, payload)
-        if progress:
-            progress(read)
+        tell(read)
 
     def _wanted(self, connections: Collection[Connection] | None) -> dict[int, Connection]:
         there = {key: topic.connection for key, topic in self._topics.items()}
