@@ -12,6 +12,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import redirect_stderr
+from dataclasses import replace
 from io import BufferedReader, StringIO
 from pathlib import Path
 from statistics import median
@@ -19,9 +20,12 @@ from statistics import median
 from mcap.writer import CompressionType
 from mcap_landmarks.recording.opening import index_of
 from mcap_landmarks.recording.reader import Recording
+from mcap_landmarks.stage import RawMessage
 
 from tests.benchmark import container_logs as logs
 from tests.benchmark import container_peers as peers
+from tests.benchmark import memory
+from tests.benchmark.rewriting import rewriting_rows
 from tests.benchmark.rows import Row, main
 
 Run = Callable[[], object]
@@ -31,14 +35,16 @@ _ROSBAGS = "rosbags-convert"
 
 
 def measure(quick: bool) -> Iterator[Row]:
-    """All rows; quick: of logs of a fifth of the size, in fewer rounds."""
+    """All rows; quick: of logs of a fifth of the size (to convert: of two fifths), in fewer rounds."""
     size, rounds = (1, 3) if quick else (5, 5)
     with tempfile.TemporaryDirectory(dir=_MEMORY if _MEMORY.is_dir() else None) as name:
         folder = Path(name)
         yield from _reading(folder, size, rounds)
         yield from _parts(folder, size)
-        yield from _converting(folder, size, rounds)
+        yield from _converting(folder, max(size, 2), rounds)
+        yield from rewriting_rows(logs.write_ours(folder / "edited.mcap", _mixed(max(size, 2))), rounds)
         yield from _help(folder, rounds)
+    yield from memory.measure(quick)
 
 
 def _reading(folder: Path, size: int, rounds: int) -> Iterator[Row]:
@@ -106,14 +112,29 @@ def _touched(path: Path, start_ns: int, end_ns: int) -> float:
         return 100 * (stream.count + log.size_bytes(None, start_ns, end_ns)) / path.stat().st_size
 
 
-def _converting(folder: Path, size: int, rounds: int) -> Iterator[Row]:
-    """Bags of both kinds to MCAP, by processes; rosbags-convert compresses with zstd only in the last row."""
-    messages = logs.by_time(
+def _mixed(size: int) -> list[RawMessage]:
+    """What a robot records: 40 MB for each step in size, most of it images."""
+    return logs.by_time(
         logs.odometry(6000 * size), logs.transforms(6000 * size), logs.scans(1200 * size), logs.images(160 * size)
     )
+
+
+def _converting(folder: Path, size: int, rounds: int) -> Iterator[Row]:
+    """Bags of both kinds to MCAP, by processes, each with what its defaults do: ours compresses all but images.
+
+    `convert_db3_zstd` reads a bag whose messages are compressed one by one, which rosbags-convert reads, too; in
+    `convert_db3_to_zstd` that compresses what it writes.
+    """
+    messages = _mixed(size)
     bag, db3 = logs.write_bag(folder / "log.bag", messages), logs.write_db3(folder / "db3", messages)
-    zstd = ("--compress", "zstd", "--compress-mode", "storage")
-    sources = (("convert_bag", bag, (), 1.0), ("convert_db3", db3, (), 1.0), ("convert_db3_zstd", db3, zstd, 1.3))
+    zstd = logs.write_db3(folder / "zstd", messages, is_compressed=True)
+    to_zstd = ("--compress", "zstd", "--compress-mode", "storage")
+    sources: tuple[tuple[str, Path, tuple[str, ...], float | None], ...] = (
+        ("convert_bag", bag, (), 1.0),
+        ("convert_db3", db3, (), 1.0),
+        ("convert_db3_zstd", zstd, (), 1.3),
+        ("convert_db3_to_zstd", db3, to_zstd, None),
+    )
     ours, theirs = folder / "ours.mcap", folder / "theirs"
     for name, source, options, goal in sources:
         commands = {
@@ -127,7 +148,10 @@ def _converting(folder: Path, size: int, rounds: int) -> Iterator[Row]:
             _process(folder, *command)
 
         seconds = _interleaved({key: lambda c=command: run(c) for key, command in commands.items()}, rounds)
-        yield _ratio(name, seconds, _ROSBAGS, goal, len(messages))
+        files = [source] if source.is_file() else list(source.iterdir())
+        read = sum(file.stat().st_size for file in files)
+        yield replace(_ratio(name, seconds, _ROSBAGS, goal, len(messages)), unit=f"x {_ROSBAGS} ({read / 1e6:.0f} MB)")
+        ours.unlink()
 
 
 def _help(folder: Path, rounds: int) -> Iterator[Row]:
@@ -159,7 +183,7 @@ def _interleaved(runs: Mapping[str, Run], rounds: int) -> dict[str, float]:
     return {name: median(values) for name, values in seconds.items()}
 
 
-def _ratio(name: str, seconds: Mapping[str, float], peer: str, goal: float, cases: int) -> Row:
+def _ratio(name: str, seconds: Mapping[str, float], peer: str, goal: float | None, cases: int) -> Row:
     """How often faster than a peer; the peers' values are how often faster than ours they are."""
     others = {key: seconds["ours"] / value for key, value in seconds.items() if key != "ours"}
     value = seconds[peer] / seconds["ours"]

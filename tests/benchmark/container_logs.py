@@ -18,7 +18,7 @@ from mcap_landmarks.stage import Connection, RawMessage
 from numpy.typing import NDArray
 from rosbags.interfaces import Connection as BagConnection
 from rosbags.rosbag1 import Writer as BagWriter
-from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as FolderWriter
 
 START_NS = 1_700_000_000 * 10**9
@@ -119,10 +119,13 @@ def write_bag(path: Path, messages: Iterable[RawMessage]) -> Path:
     return path
 
 
-def write_db3(path: Path, messages: Iterable[RawMessage]) -> Path:
-    """Written by rosbags as a folder with a file of SQLite."""
+def write_db3(path: Path, messages: Iterable[RawMessage], *, is_compressed: bool = False) -> Path:
+    """Written by rosbags as a folder with a file of SQLite, each message compressed with zstd if wanted."""
     humble = typestore()
-    with FolderWriter(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+    writer = FolderWriter(path, version=9, storage_plugin=StoragePlugin.SQLITE3)
+    if is_compressed:
+        writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+    with writer:
         known: dict[Connection, BagConnection] = {}
         for message in messages:
             on = message.connection
