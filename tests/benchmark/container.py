@@ -151,7 +151,6 @@ def _converting(folder: Path, size: int, rounds: int) -> Iterator[Row]:
         files = [source] if source.is_file() else list(source.iterdir())
         read = sum(file.stat().st_size for file in files)
         yield replace(_ratio(name, seconds, _ROSBAGS, goal, len(messages)), unit=f"x {_ROSBAGS} ({read / 1e6:.0f} MB)")
-        ours.unlink()
 
 
 def _help(folder: Path, rounds: int) -> Iterator[Row]:
