@@ -17,11 +17,13 @@ from io import BufferedReader, StringIO
 from pathlib import Path
 from statistics import median
 
+import numpy as np
 from mcap.writer import CompressionType
 from mcap_landmarks.recording.opening import index_of
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.stage import RawMessage
 
+from tests.benchmark import container_columns as columns
 from tests.benchmark import container_logs as logs
 from tests.benchmark import container_peers as peers
 from tests.benchmark import memory
@@ -40,6 +42,7 @@ def measure(quick: bool) -> Iterator[Row]:
     with tempfile.TemporaryDirectory(dir=_MEMORY if _MEMORY.is_dir() else None) as name:
         folder = Path(name)
         yield from _reading(folder, size, rounds)
+        yield from _columns(folder, size, rounds)
         yield from _parts(folder, size)
         yield from _converting(folder, max(size, 2), rounds)
         yield from rewriting_rows(logs.write_ours(folder / "edited.mcap", _mixed(max(size, 2))), rounds)
@@ -71,6 +74,27 @@ def _read_row(name: str, path: Path, rounds: int, goal: float) -> Row:
         raise RuntimeError(f"the readers do not agree how many messages there are: {counts}")
     seconds = _interleaved({name: lambda read=read: read(path) for name, read in readers.items()}, rounds)
     return _ratio(name, seconds, "mcap", goal, counts.pop())
+
+
+def _columns(folder: Path, size: int, rounds: int) -> Iterator[Row]:
+    """Fields of all messages as arrays, ours with CRCs; the value is how often faster than the best of the others."""
+    odometry = logs.write_mcap(folder / "odometry.mcap", logs.odometry(30_000 * size), CompressionType.ZSTD)
+    yield _columns_row("columns_odometry", odometry, columns.odometry_readers(), min(rounds, 3))
+    odometry.unlink()
+    scans = logs.write_mcap(folder / "scans.mcap", logs.scans(3000 * size), CompressionType.ZSTD)
+    yield _columns_row("columns_scan", scans, columns.scan_readers(), rounds)
+    scans.unlink()
+
+
+def _columns_row(name: str, path: Path, readers: Mapping[str, columns.Take], rounds: int) -> Row:
+    arrays = [read(path) for read in readers.values()]
+    if not all(np.array_equal(a, b) for found in arrays[1:] for a, b in zip(found, arrays[0], strict=True)):
+        raise RuntimeError(f"{name}: the readers do not agree")
+    count = len(arrays[0][0])
+    del arrays
+    seconds = _interleaved({key: lambda read=read: read(path) for key, read in readers.items()}, rounds)
+    best = min((key for key in seconds if key != "ours"), key=lambda key: seconds[key])
+    return _ratio(name, seconds, best, 10, count)
 
 
 def _parts(folder: Path, size: int) -> Iterator[Row]:
