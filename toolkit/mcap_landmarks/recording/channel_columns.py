@@ -1,7 +1,7 @@
 """Columns of a channel's messages: found by the message indexes of their chunks, and gathered without a loop."""
 
 from array import array
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import BinaryIO, NamedTuple
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.messages.columns import Table
-from mcap_landmarks.messages.gathering import PlacedMessages, in_order, joined, read_placed
+from mcap_landmarks.messages.gathering import Gathered, PlacedMessages, Room, in_order, read_placed
 from mcap_landmarks.messages.layout import Layout
 from mcap_landmarks.recording.blocks import DamagedBlockError, records_in
 from mcap_landmarks.recording.container import MESSAGE, MESSAGE_FIXED, RECORD, Opcode
@@ -51,8 +51,31 @@ class Wanted(NamedTuple):
 
     channel_id: int
     layout: Layout
-    fields: Collection[str] | None
+    fields: Collection[str]
     within_ns: tuple[int, int]
+
+
+class GatheredBlocks:
+    """The rows of blocks, which come by their start; so many are expected. `empty` is a table of their columns."""
+
+    def __init__(self, empty: Table, expected: int) -> None:
+        self._expected, self._broken = expected, 0
+        self._log, self._publish, self._table = Room(), Room(), Gathered(empty, expected)
+
+    def add(self, rows: BlockRows) -> None:
+        """Take the rows of the next block."""
+        self._log.add(rows.log, self._expected)
+        self._publish.add(rows.publish, self._expected)
+        self._table.add(rows.table)
+        self._broken += rows.broken
+
+    def columns(self) -> ChannelColumns:
+        """All rows in the order of log time; those of equal time keep their order."""
+        log, publish, table = self._log.filled, self._publish.filled, self._table.table()
+        if (log[1:] < log[:-1]).any():
+            order = np.argsort(log, kind="stable")
+            log, publish, table = log[order], publish[order], in_order(table, order)
+        return ChannelColumns(_signed(log), _signed(publish), table, self._broken)
 
 
 def rows_in(stream: BinaryIO, block: Block, asked: Wanted, content: memoryview) -> BlockRows:
@@ -60,35 +83,21 @@ def rows_in(stream: BinaryIO, block: Block, asked: Wanted, content: memoryview) 
 
     Raises:
         DamagedBlockError: a record runs over the end, or is too short for what it is.
-        MessageError: the type has no such field.
     """
     heads, starts = _messages(stream, block, content)
     first_ns, last_ns = asked.within_ns
     wanted = heads["channel"] == asked.channel_id
     if block.start_ns < first_ns or block.end_ns >= last_ns:
-        wanted &= (heads["log"] >= np.uint64(first_ns)) & (heads["log"] <= np.uint64(last_ns - 1))
-    heads, starts = heads[wanted], starts[wanted]
-    sizes = heads["length"].astype(np.int64) - MESSAGE_FIXED
-    table, is_read = read_placed(asked.layout, PlacedMessages(content, starts + MESSAGE.size, sizes), asked.fields)
-    heads = heads[is_read]
-    return BlockRows(heads["log"], heads["publish"], table, len(is_read) - len(heads))
-
-
-def by_log_time(blocks: Sequence[BlockRows], asked: Wanted) -> ChannelColumns:
-    """The rows of blocks, which are by their start, in the order of log time; those of equal time keep their order."""
-    nothing = np.zeros(0, dtype=np.int64)
-    empty, _ = read_placed(asked.layout, PlacedMessages(memoryview(b""), nothing, nothing), asked.fields)
-    log, publish = (np.concatenate([nothing.astype(np.uint64), *(rows[i] for rows in blocks)]) for i in range(2))
-    table = joined([empty, *(rows.table for rows in blocks)])
-    if (log[1:] < log[:-1]).any():
-        order = np.argsort(log, kind="stable")
-        log, publish, table = log[order], publish[order], in_order(table, order)
-    broken = sum(rows.broken for rows in blocks)
-    return ChannelColumns(_signed(log), _signed(publish), table, broken)
+        wanted &= (heads["log"] >= np.uint64(max(first_ns, 0))) & (heads["log"] <= np.uint64(last_ns - 1))
+    sizes = heads["length"][wanted].astype(np.int64) - MESSAGE_FIXED
+    messages = PlacedMessages(content, starts[wanted] + MESSAGE.size, sizes)
+    table, is_read = read_placed(asked.layout, messages, asked.fields)
+    log, publish = (heads[name][wanted][is_read] for name in ("log", "publish"))
+    return BlockRows(log, publish, table, len(messages) - table.rows)
 
 
 def _signed(times_ns: NDArray[np.uint64]) -> Indices:
-    return np.minimum(times_ns, _LATEST).astype(np.int64)
+    return np.minimum(times_ns.astype(np.uint64), _LATEST).astype(np.int64)
 
 
 def _messages(stream: BinaryIO, block: Block, content: memoryview) -> tuple[Heads, Indices]:

@@ -13,10 +13,11 @@ from mcap.exceptions import McapError
 
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, STAGE, carried_fingerprint
+from mcap_landmarks.messages.gathering import empty_table
 from mcap_landmarks.messages.layout import Layout
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.blocks import DamagedBlockError, block_content
-from mcap_landmarks.recording.channel_columns import BlockRows, ChannelColumns, Wanted, by_log_time, rows_in
+from mcap_landmarks.recording.channel_columns import ChannelColumns, GatheredBlocks, Wanted, rows_in
 from mcap_landmarks.recording.chunk_copy import WholeChunk, read_whole
 from mcap_landmarks.recording.chunk_messages import Open, drain, push
 from mcap_landmarks.recording.container import CHUNK, RECORD, parse, read_up_to
@@ -187,11 +188,13 @@ class Recording:
             MessageError: the type has no such field.
         """
         within, key = (start_ns or 0, 2**64 if end_ns is None else end_ns), self._ids[connection]
-        asked, found = Wanted(key, layout, fields, within), list[BlockRows]()
+        empty = empty_table(layout, fields)
+        wanted, found = Wanted(key, layout, empty.columns, within), GatheredBlocks(empty, self.index.counts.get(key, 0))
         for block in self._blocks({key: connection}, *within):
-            rows = self._take(block, partial(rows_in, self._stream, block, asked), progress)
-            found += [] if rows is None else [rows]
-        return by_log_time(found, asked)
+            rows = self._take(block, partial(rows_in, self._stream, block, wanted), progress)
+            if rows is not None:
+                found.add(rows)
+        return found.columns()
 
     def pieces(
         self,
