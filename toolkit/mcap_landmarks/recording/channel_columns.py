@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.messages.columns import Table
-from mcap_landmarks.messages.gathering import Gathered, PlacedMessages, Room, in_order, read_placed
+from mcap_landmarks.messages.gathered_rows import Gathered, Indices, Room, in_order
+from mcap_landmarks.messages.gathering import PlacedMessages, read_placed
 from mcap_landmarks.messages.layout import Layout
 from mcap_landmarks.recording.blocks import DamagedBlockError, records_in
 from mcap_landmarks.recording.container import MESSAGE, MESSAGE_FIXED, RECORD, Opcode
 from mcap_landmarks.recording.summary_index import Block
 
-Indices = NDArray[np.int64]
 _HEAD = np.dtype(
     [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")]
 )
