@@ -14,9 +14,11 @@ from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.codec import decode
+from mcap_landmarks.messages.layout import layout_of
 from mcap_landmarks.messages.parts import PLANAR
 from mcap_landmarks.messages.poses import Odometry, PoseStamped, PoseWithCovarianceStamped
 from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.messages.typestore import definition
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import Recording, open_recording
 
@@ -47,23 +49,26 @@ class PoseTrack:
 
 @dataclass(slots=True)
 class _Rows:
-    """Poses as they come: time, position, quaternion and planar covariance, which is NaN where unknown."""
+    """Poses as they come, in parts of K: log time and time, position, quaternion, planar covariance (NaN: unknown)."""
 
-    time_ns: list[int] = field(default_factory=list)
+    log_ns: list[Indices] = field(default_factory=list)
+    time_ns: list[Indices] = field(default_factory=list)
     positions: list[Array] = field(default_factory=list)
     quaternions: list[Array] = field(default_factory=list)
     covariances: list[Array] = field(default_factory=list)
     frames: Counter[str] = field(default_factory=Counter)
     broken: int = 0
 
-    def add(self, time_ns: int, frame: str, parts: tuple[Array, Array], covariance: Array | None = None) -> None:
-        """Take the next pose: position (3,) and quaternion (4,)."""
-        self.time_ns.append(time_ns)
+    def add(self, times: tuple[Indices, Indices], parts: tuple[Array, Array], covariances: Array | None = None) -> None:
+        """Take the next poses: log times and stamps (K,), positions (K, 3) and quaternions (K, 4), (K, 3, 3)."""
+        log_ns, stamp_ns = times
+        self.log_ns.append(log_ns)
+        self.time_ns.append(np.where(stamp_ns == 0, log_ns, stamp_ns))
         self.positions.append(parts[0])
         self.quaternions.append(parts[1])
-        known = covariance is not None and covariance.any()
-        self.covariances.append(covariance if covariance is not None and known else np.full((3, 3), np.nan))
-        self.frames[plain(frame)] += 1
+        known = np.full((len(log_ns), 3, 3), np.nan) if covariances is None else covariances.copy()
+        known[~known.any(axis=(1, 2))] = np.nan
+        self.covariances.append(known)
 
 
 def read_poses(
@@ -81,9 +86,8 @@ def read_poses(
     with open_recording(path) as recording:
         ranks = _candidates(recording)
         chosen = topic or _default(path, ranks)
-        rows = _Rows()
         if chosen in ranks:
-            _read(recording, chosen, rows, progress)
+            rows = _read(recording, chosen, progress)
         else:
             rows = _transforms(recording, chosen, child, progress)
         losses = list(recording.losses)
@@ -126,22 +130,24 @@ def _default(path: Location, ranks: dict[str, int]) -> str:
     return best[0]
 
 
-def _read(recording: Recording, topic: str, rows: _Rows, progress: Progress | None) -> None:
-    wanted = [one for one in recording.connections(topic) if one.read_as in _TYPES]
-    for raw in recording.messages(wanted, progress=progress):
-        try:
-            message = decode(_TYPES[raw.connection.message_type], raw.data)
-        except MessageError:
-            rows.broken += 1
+def _read(recording: Recording, topic: str, progress: Progress | None) -> _Rows:
+    rows = _Rows()
+    for connection in recording.connections(topic):
+        if connection.read_as not in _TYPES:
             continue
-        spread = None if isinstance(message, PoseStamped) else _covariance(message)
-        parts = message.position_m, message.orientation_xyzw
-        rows.add(message.stamp_ns or raw.log_time_ns, message.frame_id, parts, spread)
-
-
-def _covariance(message: PoseWithCovarianceStamped | Odometry) -> Array:
-    full = message.covariance if isinstance(message, PoseWithCovarianceStamped) else message.pose_covariance
-    return full[PLANAR]
+        message = _TYPES[connection.read_as]
+        pose = "pose" if message is PoseStamped else "pose.pose"
+        fields = ["header.stamp", "header.frame_id", f"{pose}.position", f"{pose}.orientation"]
+        fields += [] if message is PoseStamped else ["pose.covariance"]
+        layout = layout_of(message.ROS_TYPE, definition(message.ROS_TYPE))
+        found = recording.columns(connection, layout, fields, progress=progress)
+        stamps, frames, positions, quaternions, *spread = (found.table.columns[name].values for name in fields)
+        planar = spread[0].reshape(-1, 6, 6)[:, PLANAR[0], PLANAR[1]] if spread else None
+        rows.add((found.log_time_ns, stamps[:, 0]), (positions, quaternions), planar)
+        for frame, count in Counter(frames[:, 0].tolist()).items():
+            rows.frames[plain(frame.decode(errors="replace"))] += count
+        rows.broken += found.broken
+    return rows
 
 
 def _transforms(recording: Recording, topic: str, child: str | None, progress: Progress | None) -> _Rows:
@@ -160,7 +166,9 @@ def _transforms(recording: Recording, topic: str, child: str | None, progress: P
             continue
         for one in transforms:
             mine = moves.setdefault((plain(one.frame_id), plain(one.child_frame_id)), _Rows())
-            mine.add(one.stamp_ns or raw.log_time_ns, one.frame_id, (one.translation_m, one.rotation_xyzw))
+            times = np.array([[raw.log_time_ns], [one.stamp_ns]], dtype=np.int64)
+            mine.add((times[0], times[1]), (one.translation_m[None], one.rotation_xyzw[None]))
+            mine.frames[plain(one.frame_id)] += 1
     rows = _moves_to(child, moves, f"{recording.path}: {topic}")
     rows.broken = broken
     return rows
@@ -177,10 +185,13 @@ def _moves_to(child: str | None, moves: Mapping[tuple[str, str], _Rows], place: 
 
 def _trajectory(rows: _Rows) -> tuple[Trajectory, list[str]]:
     """The trajectory of what can be used, and in words what cannot."""
-    count = len(rows.time_ns)
-    times: Indices = np.array(rows.time_ns, dtype=np.int64)
-    positions, quaternions = np.array(rows.positions).reshape(-1, 3), np.array(rows.quaternions).reshape(-1, 4)
-    covariances = np.array(rows.covariances).reshape(-1, 3, 3)
+    nothing = np.zeros(0, dtype=np.int64)
+    order = np.argsort(np.concatenate([nothing, *rows.log_ns]), kind="stable")  # of several connections
+    times, count = np.concatenate([nothing, *rows.time_ns])[order], len(order)
+    positions, quaternions, covariances = (
+        np.concatenate([np.zeros((0, *shape)), *found])[order]
+        for shape, found in (((3,), rows.positions), ((4,), rows.quaternions), ((3, 3), rows.covariances))
+    )
     known = quaternions.any(axis=1)
     headings = np.where(known, yaw_from_quaternion(quaternions), np.nan)
     finite = np.isfinite(positions[:, :2]).all(axis=1) & np.isfinite(quaternions).all(axis=1)
