@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from google.protobuf.descriptor_pb2 import FileDescriptorProto, FileDescriptorSet
 from mcap.reader import make_reader
+from mcap_landmarks.errors import MessageError
 from mcap_landmarks.inspection.info import describe
 from mcap_landmarks.messages.typestore import RosObject, typestore
 from mcap_landmarks.runs.conversion import Converted
+from mcap_landmarks.sources._foxglove_fields import COVARIANCES, JsonFields
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from tests.runs.conversion import doctor, one
@@ -322,3 +324,11 @@ def test_many_parts_are_refused_before_they_are_objects(tmp_path: Path) -> None:
     done = one(write(tmp_path / "in.mcap", (*topic[:-1], [*topic[-1], many])), tmp_path / "out.mcap")
     assert (done.topics["/poses"], done.lost) == (1, 1)
     assert "70000" in done.losses[0]
+
+
+def test_numbers_with_names_may_be_their_names() -> None:
+    """As protobuf's own JSON has them."""
+    fields = JsonFields({"type": "DIAGONAL_KNOWN", "other": 3, "none": "KNOWN TO NOBODY"})
+    assert (fields.choice("type", COVARIANCES), fields.choice("other", COVARIANCES)) == (2, 3)
+    with pytest.raises(MessageError, match="none is no number"):
+        fields.choice("none", COVARIANCES)

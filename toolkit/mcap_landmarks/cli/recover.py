@@ -18,6 +18,8 @@ def command(
         Location, typer.Argument(metavar="IN", parser=location, help="MCAP, ROS 1 .bag, .db3 or ROS 2 folder.")
     ],
     output: options.Output,
+    distro: options.Distro = None,
+    definitions: options.Definitions = None,
     overwrite: options.Overwrite = False,
     json: options.Json = False,
 ) -> None:
@@ -29,7 +31,9 @@ def command(
     """
     from mcap_landmarks.runs.recover import recover, report
 
-    done = recover(log, output, progress, overwrite=overwrite)
+    settings: dict[str, dict[str, object]] = {}
+    options.add_definitions(settings, distro, definitions)
+    done = recover(log, output, progress, settings, overwrite=overwrite)
     for note in done.notes:
         warn(f"note: {log}: {note}")
     for loss in done.losses:

@@ -98,14 +98,23 @@ class Findings:
             check_content(opcode, content)
             if opcode == Opcode.SCHEMA:
                 schema = parse(records.Schema, content)
+                self._compare(opcode, schema.id, rank, self.index.schemas.get(schema.id, schema) == schema)
                 if self._is_best(opcode, schema.id, rank):
                     self.index.schemas[schema.id] = schema
             else:
                 channel = parse(records.Channel, content)
+                self._compare(opcode, channel.id, rank, self.index.channels.get(channel.id, channel) == channel)
                 if self._is_best(opcode, channel.id, rank):
                     self.index.channels[channel.id] = channel
         except (McapError, ValueError):
             self.remarks.append(f"the record of a {_NAMES[Opcode(opcode)]} is damaged")
+
+    def _compare(self, opcode: int, key: int, rank: int, is_same: bool) -> None:
+        """Say that one id has two definitions, of which nothing tells the better."""
+        if not is_same and rank == self._ranks.get((opcode, key)):
+            name = _NAMES[Opcode(opcode)]
+            loss = f"the {name} {key} is defined twice, and differently; messages of both count as the last one's"
+            self.lost_records.append(loss)
 
     def _is_best(self, opcode: int, key: int, rank: int) -> bool:
         if rank < self._ranks.get((opcode, key), 0):
@@ -126,7 +135,7 @@ class Findings:
             suspect_chunks=tuple(suspects),
             resyncs=tuple(self.stretches),
             cut=self._cut(),
-            records=tuple(self.lost_records),
+            records=tuple(dict.fromkeys([*self.lost_records, *self.index.replaced])),
             unverified=0 if self.crc_matches else self.unverified,
             loose=0 if self.crc_matches else self.loose,
             duplicates=tuple(self.duplicates),

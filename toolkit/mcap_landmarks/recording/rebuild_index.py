@@ -40,6 +40,7 @@ class _Scanner:
         self._chunks = ScannedChunks(self._read, size, found)
         self._loose = LooseMessages(found)
         self._summary_rank = 1
+        self._follows_chunk = False
         self._stream = stream
         self._handlers: dict[int, Callable[[int, int], None]] = {
             Opcode.SCHEMA: lambda offset, length: self._define(Opcode.SCHEMA, offset, length),
@@ -80,6 +81,10 @@ class _Scanner:
         return fits(opcode, length, self._read, offset + RECORD.size)
 
     def _take(self, opcode: int, offset: int, length: int) -> None:
+        if opcode == Opcode.MESSAGE and self._is_message_index(offset, length):
+            self._found.remarks.append(f"the message index at byte {offset} is damaged, which tells of no message")
+            opcode = Opcode.MESSAGE_INDEX
+        self._follows_chunk = opcode in {Opcode.CHUNK, Opcode.MESSAGE_INDEX}
         if opcode != Opcode.MESSAGE_INDEX:
             self._chunks.close()
         if opcode == Opcode.MESSAGE:
@@ -91,6 +96,14 @@ class _Scanner:
         handler = self._handlers.get(opcode)
         if handler:
             handler(offset, length)
+
+    def _is_message_index(self, offset: int, length: int) -> bool:
+        """Whether what stands for a message is the index of a chunk, of whose opcode one bit was flipped.
+
+        An index has the length of its entries where a message has its sequence number.
+        """
+        entries = int.from_bytes(self._read(offset + RECORD.size + 2, 4), "little")
+        return self._follows_chunk and entries == length - 6 and entries % 16 == 0
 
     def _damaged(self, opcode: int, offset: int, length: int) -> int:
         """Deal with what is no sound record; where to go on."""
@@ -140,7 +153,7 @@ class _Scanner:
         except (McapError, ValueError):
             self._found.lost_records.append(f"the metadata record at byte {offset} is damaged; it is left out")
         else:
-            self.index.metadata[record.name] = record.metadata
+            self.index.take_metadata(record)
             self._found.metadata_count += 1
 
     def _attachment(self, offset: int, length: int) -> None:

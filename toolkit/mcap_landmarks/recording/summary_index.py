@@ -57,6 +57,17 @@ class Index:
     start_ns: int | None = None
     end_ns: int | None = None
     damage: Damage = field(default_factory=Damage)
+    replaced: list[str] = field(default_factory=list)
+
+    def take_metadata(self, record: records.Metadata) -> None:
+        """A metadata record; of several with one name the last counts, and `replaced` says which were others.
+
+        rosbag2 writes its own when it opens a file, and again when it closes it.
+        """
+        earlier = self.metadata.get(record.name, record.metadata)
+        if earlier != record.metadata and record.name != "rosbag2":
+            self.replaced.append(f"of the metadata records named {record.name} only the last is kept")
+        self.metadata[record.name] = record.metadata
 
     def connection(self, channel_id: int) -> Connection:
         """A channel with its schema."""
@@ -126,6 +137,7 @@ def index_from_summary(stream: BinaryIO, size: int, header: records.Header, data
         return "its summary is damaged; read from the front"
     total = sum(index.counts.values())
     index.damage = Damage(expected=total, recovered=total, unverified=unverified, is_whole=True)
+    index.damage = replace(index.damage, records=tuple(dict.fromkeys(index.replaced)))
     return index
 
 
@@ -178,7 +190,7 @@ def _collect(
         elif opcode == Opcode.METADATA_INDEX:
             where = parse(records.MetadataIndex, content)
             record = parse(records.Metadata, read_record(stream, where.offset)[1])
-            index.metadata[record.name] = record.metadata
+            index.take_metadata(record)
             index.metadata_places.append(where.offset)
         elif opcode == Opcode.ATTACHMENT_INDEX:
             index.attachments.append(parse(records.AttachmentIndex, content).offset)
@@ -222,7 +234,7 @@ def _has_all(index: Index, statistics: records.Statistics) -> bool:
         statistics.metadata_count,
     )
     schemas = {channel.schema_id for channel in index.channels.values()} - {0}  # 0 stands for none
-    there = (len(index.channels), len(index.blocks), len(index.attachments), len(index.metadata))
+    there = (len(index.channels), len(index.blocks), len(index.attachments), len(index.metadata_places))
     return counted == there and schemas <= set(index.schemas)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from mcap_landmarks.config import Settings
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.locations import Location, size_of, to_read
 from mcap_landmarks.manifest import RUN, Manifest, file_hash, is_generated
@@ -39,8 +40,12 @@ class Recovered:
     notes: tuple[str, ...]
 
 
-def recover(place: Location, output: Location, watch: Watch, *, overwrite: bool = False) -> Recovered:
+def recover(
+    place: Location, output: Location, watch: Watch, settings: Settings | None = None, *, overwrite: bool = False
+) -> Recovered:
     """Save what is sound of an MCAP file on the same channels; a bag is converted, as far as it can be read.
+
+    The settings of its source say where definitions come from that a bag lacks.
 
     Raises:
         ToolkitError: nothing can be recovered, or the output cannot be written; nothing is left behind.
@@ -50,7 +55,7 @@ def recover(place: Location, output: Location, watch: Watch, *, overwrite: bool 
     check_apart([target], [place])
     if path.is_file() and _is_mcap(path):
         return _recover_mcap(path, target, watch, overwrite=overwrite)
-    return _recover_bag(path, target, watch, overwrite=overwrite)
+    return _recover_bag(path, target, watch, settings or {}, overwrite=overwrite)
 
 
 def _is_mcap(path: Path) -> bool:
@@ -113,9 +118,9 @@ def _copy(recording: Recording, writer: RecordingWriter, advance: Progress) -> N
             writer.write(piece)
 
 
-def _recover_bag(path: Path, target: Path, watch: Watch, *, overwrite: bool) -> Recovered:
+def _recover_bag(path: Path, target: Path, watch: Watch, settings: Settings, *, overwrite: bool) -> Recovered:
     with reading_from_front():
-        conversion = convert([path], target, Selection(), {}, watch, overwrite=overwrite, verb="recover")
+        conversion = convert([path], target, Selection(), settings, watch, overwrite=overwrite, verb="recover")
     (done,) = conversion.outputs
     losses = done.told_losses()
     expected = None if losses and not done.lost else done.declared  # what is damaged may not count itself

@@ -60,7 +60,7 @@ def files_of(path: Path) -> BagFiles:
 def _listed_files(path: Path, about: BagDescription, present: Sequence[Path]) -> BagFiles:
     """The files of a bag whose metadata list them, and those that only continue their numbers."""
     by_name = {file.name.removesuffix(".zstd"): file for file in present}
-    listed = [name.removesuffix(".zstd") for name in about.files]
+    listed = _listed(about)
     missing = [name for name in listed if name not in by_name]
     if len(missing) == len(listed) <= len(present):  # they were renamed
         note = f"{path}: {METADATA} lists none of the {len(present)} storage files; took all of them"
@@ -70,6 +70,11 @@ def _listed_files(path: Path, about: BagDescription, present: Sequence[Path]) ->
     notes = _notes(path, more, others)
     files = [file for file in present if file not in others]
     return BagFiles(files, about, None if more else about.messages, losses, notes)
+
+
+def _listed(about: BagDescription) -> list[str]:
+    """The files that metadata list, as if none were compressed; a name of another kind was cut."""
+    return [name.removesuffix(".zstd") for name in about.files if name.endswith(SUFFIXES)]
 
 
 def _notes(path: Path, more: Sequence[Path], others: Sequence[Path]) -> list[str]:

@@ -67,7 +67,7 @@ def _description(about: Mapping[str, object]) -> BagDescription:
 
 def _names(files: object) -> tuple[str, ...]:
     found = files if isinstance(files, list) else []
-    return tuple(PurePosixPath(one).name for one in found if isinstance(one, str))
+    return tuple(PurePosixPath(one.replace("\\", "/")).name for one in found if isinstance(one, str))
 
 
 def _types(topics: list[object]) -> Iterator[tuple[str, str]]:

@@ -82,20 +82,23 @@ def _unpacked_in_pieces(data: bytes | memoryview) -> bytes:
 class Db3Log:
     """The log in one file; `definitions` gives the types that the file does not define."""
 
-    def __init__(self, path: Path, definitions: Definitions) -> None:
+    def __init__(self, path: Path, definitions: Definitions, origin: Path | None = None) -> None:
+        """`origin` is the file that errors name, where `path` is a temporary one."""
         self.losses: list[str] = []
         self.left_out: list[OmittedTopic] = []
-        self._path = path
+        self._path, self._origin = path, origin or path
         self._unpacked = unpacker()
         try:
             with _database(path) as database:
                 self._read_topics(database, definitions)
         except (sqlite3.DatabaseError, UnicodeDecodeError, KeyError, TypeError) as error:
-            raise RecordingError(f"{path} is no ROS 2 bag, or too damaged to read: {error}; copy it again") from error
+            raise RecordingError(
+                f"{self._origin} is no ROS 2 bag, or too damaged to read: {error}; copy it again"
+            ) from error
 
     def _read_topics(self, database: sqlite3.Connection, definitions: Definitions) -> None:
         if not {"topics", "messages"} <= columns_of(database, "sqlite_master", "name"):
-            raise RecordingError(f"{self._path} has no tables of topics and messages; it is no ROS 2 bag")
+            raise RecordingError(f"{self._origin} has no tables of topics and messages; it is no ROS 2 bag")
         own, distribution = definitions_in(database), distribution_in(database)
         known = definitions.also(distribution)
         self.about = (self._path.name, about_in(database, distribution))

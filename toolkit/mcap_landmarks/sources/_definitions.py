@@ -16,6 +16,8 @@ from mcap_landmarks.sources._type_graph import MessageFields, filled, needed_by
 
 _Find = Callable[[str], MessageFields | None]
 
+_GIVEN = "the given"
+
 
 class Definitions:
     """Where definitions come from: what the user gave, then the distribution the user named, then those that the bag
@@ -58,7 +60,7 @@ class Definitions:
         return _definition(message_type, types.get, "the file's", self._find)
 
     def _sources(self) -> Iterator[tuple[str, _Find]]:
-        yield "the given", self.files.fields
+        yield _GIVEN, self.files.fields
         for distribution in self._distributions:
             yield f"{distribution}'s", partial(fields_in, distribution)
         yield "every distribution's", fields_of_all
@@ -102,4 +104,4 @@ def _definition(message_type: str, find: _Find, origin: str, others: _Find) -> D
                 f"{len(data)} bytes are not {origin} {message_type}: {str(error).rstrip('.')}"
             ) from error
 
-    return Definition(text, check)
+    return Definition(text, check, is_given=origin == _GIVEN)

@@ -20,6 +20,10 @@ MOST_PARTS = 1 << 16
 _SECONDS, _NANOSECONDS = ("sec", "seconds"), ("nsec", "nanos", "nanosec")
 """What the parts of a time are called in Foxglove's JSON schemas, in protobuf, and in ROS 2."""
 _RFC_3339 = re.compile(r"(\d{4}-\d\d-\d\d)[Tt ](\d\d:\d\d:\d\d)(?:\.(\d{1,9}))?([Zz]|[+-]\d\d:\d\d)")
+COVARIANCES = ("UNKNOWN", "APPROXIMATED", "DIAGONAL_KNOWN", "KNOWN")
+NUMBERS = ("UNKNOWN", "UINT8", "INT8", "UINT16", "INT16", "UINT32", "INT32", "FLOAT32", "FLOAT64")
+LEVELS = ("UNKNOWN", "DEBUG", "INFO", "WARNING", "ERROR", "FATAL")
+"""The names of what Foxglove's schemas number: kinds of a covariance, types of numbers, levels of a log."""
 _CAMEL = re.compile(r"_(\w)")
 
 
@@ -59,6 +63,11 @@ class FieldsOf(ABC):
         if not value.is_integer():
             raise MessageError(f"{name} is {value}, not a whole number")
         return int(value)
+
+    def choice(self, name: str, names: Sequence[str]) -> int:
+        """The number of one of some names, which protobuf's own JSON writes in its place."""
+        value = self.get(name)
+        return names.index(value) if isinstance(value, str) and value in names else self.integer(name)
 
     def text(self, name: str) -> str:
         """Text."""

@@ -14,7 +14,7 @@ from mcap_landmarks.messages.parts import Array, header_to_ros, make, pose_to_ro
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.messages.typestore import RosObject, full_name, typestore
-from mcap_landmarks.sources._foxglove_fields import FieldsOf, JsonFields
+from mcap_landmarks.sources._foxglove_fields import COVARIANCES, LEVELS, NUMBERS, FieldsOf, JsonFields
 from mcap_landmarks.stage import Connection
 
 NO_LIMIT_M = float(np.finfo(np.float32).max)
@@ -144,7 +144,7 @@ def _cloud(fields: FieldsOf) -> RosObject:
     if stride < 1:
         raise MessageError(f"points of {stride} bytes are none")
     points = np.frombuffer(data, np.uint8)[: len(data) // stride * stride].reshape(-1, stride)
-    places = [(part.text("name"), part.integer("offset"), _datatype(part.integer("type"))) for part in parts]
+    places = [(part.text("name"), part.integer("offset"), _datatype(part.choice("type", NUMBERS))) for part in parts]
     return make(
         "sensor_msgs/PointCloud2",
         header=_header(fields),
@@ -211,12 +211,12 @@ def _fix(fields: FieldsOf) -> RosObject:
         longitude=place[1],
         altitude=place[2],
         position_covariance=covariance if len(covariance) else np.zeros(9),
-        position_covariance_type=fields.integer("position_covariance_type"),
+        position_covariance_type=fields.choice("position_covariance_type", COVARIANCES),
     )
 
 
 def _log(fields: FieldsOf) -> RosObject:
-    level = fields.integer("level")
+    level = fields.choice("level", LEVELS)
     return make(
         "rcl_interfaces/Log",
         stamp=stamp_to_ros(fields.time_ns("timestamp")),

@@ -27,6 +27,8 @@ Convert = Callable[[Payload], Payload]
 
 _MD5 = re.compile(r"[0-9a-f]{32}")  # publishers that do not know their type write *
 _MD5_OF_NOTHING = hashlib.md5(b"", usedforsecurity=False).hexdigest()
+_MOST_WORDS = 16
+"""Of what is wrong with a definition: rosbags tells where it stands in the text, and repeats that."""
 _RENAMED = {"tf/msg/tfMessage": "tf2_msgs/msg/TFMessage"}
 _HEADER = "std_msgs/msg/Header"
 _ONE_BYTE = {"byte", "char", "uint8"}
@@ -66,7 +68,7 @@ def converted(ros_type: str, text: str, md5sum: str = "", files: DefinitionFiles
         source, is_sure = _source(source_name, text, md5sum, files)
         target_name, target = _target(source.fielddefs, source_name)
     except (MessageError, TypesysError, KeyError, ValueError, AssertionError, RecursionError, SyntaxError) as error:
-        why = (str(error).splitlines() or [type(error).__name__])[0]
+        why = " ".join(str(error).split()[:_MOST_WORDS]) or type(error).__name__
         raise MessageError(f"the definition of {ros_type} cannot be understood: {why}") from error
     humble = typestore().fielddefs
     own = target_name not in humble or target.fielddefs[target_name][1] != humble[target_name][1]

@@ -92,11 +92,12 @@ class Log(Protocol):
 class Definition:
     """A definition (`ros2msg`) that is not the recording's own; `check` decodes a message to its full length.
 
-    `check` raises MessageError for what does not fit.
+    `check` raises MessageError for what does not fit. The user gave one that `is_given`.
     """
 
     text: str
     check: Callable[[Payload], None]
+    is_given: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ MessageFields = tuple[Constdefs, Fields]
 Types = Mapping[str, MessageFields]
 FILLER = "structure_needs_at_least_one_member"
 """The field of a byte that ROS 2 puts into messages without any."""
+_REMEDY = "; give it with --definitions"
 _DEEPEST = 64
 """Levels of nesting; those of real messages are below ten, and deeper ones are taken for damage."""
 
@@ -38,7 +39,7 @@ def needed_by(name: str, find: Callable[[str], MessageFields | None]) -> dict[st
             return
         fields = find(one)
         if fields is None:
-            raise MessageError(f"nothing defines {one}" + (f", which {within[-1]} needs" if within else ""))
+            raise MessageError(f"nothing defines {one}" + (f", which {within[-1]} needs" if within else "") + _REMEDY)
         found[one] = fields
         for _, kind in fields[1]:
             if nested := nested_in(kind):

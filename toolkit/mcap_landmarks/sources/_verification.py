@@ -16,6 +16,13 @@ def defined(connection: Connection, definition: Definition) -> Connection:
     return replace(connection, schema=definition.text.encode(), schema_encoding="ros2msg")
 
 
+def _remedy(candidates: Sequence[Definition]) -> str:
+    """What to do where no definition fits: not again what was just tried."""
+    if any(one.is_given for one in candidates):
+        return "--definitions names another version of it than the one it was recorded with"
+    return "give its definition with --definitions"
+
+
 def settled(
     candidates: Mapping[_K, Sequence[Definition]], read: Callable[[Collection[_K]], Iterable[tuple[_K, Payload]]]
 ) -> dict[_K, Definition | str]:
@@ -43,6 +50,6 @@ def settled(
             problems[key].append(misfits[key])
             trying[key] = i + 1
             if i + 1 == len(candidates[key]):
-                decided[key] = f"{'; '.join(problems[key])}; give its definition with --definitions"
+                decided[key] = f"{'; '.join(problems[key])}; {_remedy(candidates[key])}"
                 del trying[key]
     return decided
