@@ -41,6 +41,7 @@ class Case:
     replaces: str = ""
 
 
+_SEEN = "--end 1767225605000000000 --remap /ground_truth/detections=/landmarks/detections"
 CASES = (
     Case("convert a bag", "log.bag", "convert log.bag -o out.mcap"),
     Case("convert and split", "log.bag", "convert log.bag -o parts --split-count 2000"),
@@ -49,17 +50,20 @@ CASES = (
     Case(
         "localize onto an output",
         "scenes.mcap site.db",
-        "localize scenes.mcap --map site.db -o out.mcap --set localize.max_sigma_m=0.4",
+        f"localize scenes.mcap --map site.db -o out.mcap --set localize.max_sigma_m=0.4 {_SEEN}",
         "out.mcap",
     ),
     Case(
         "run",
         "demo.mcap site.db",
-        "run demo.mcap --stages cluster,fuse,localize --map site.db -o out.mcap --end 1767225605000000000 "
-        "--remap /ground_truth/detections=/landmarks/detections",
+        f"run demo.mcap --stages cluster,fuse,localize --map site.db -o out.mcap {_SEEN}",
     ),
-    Case("map onto a database", "scenes.mcap", "map scenes.mcap --map map.db --overwrite", "map.db"),
-    Case("batch", "scenes.mcap again.mcap site.db", "batch localize scenes.mcap again.mcap --map site.db -o outs"),
+    Case("map onto a database", "scenes.mcap", f"map scenes.mcap --map map.db --overwrite {_SEEN}", "map.db"),
+    Case(
+        "batch",
+        "scenes.mcap again.mcap site.db",
+        f"batch localize scenes.mcap again.mcap --map site.db -o outs {_SEEN}",
+    ),
 )
 
 
@@ -87,7 +91,7 @@ def prepare(folder: Path) -> None:
     (run_case,) = (case for case in CASES if case.name == "run")
     _finish(folder, run_case.words.replace("out.mcap", "scenes.mcap").replace(",localize", ""))
     shutil.copy(folder / "scenes.mcap", folder / "again.mcap")
-    _finish(folder, "localize scenes.mcap --map site.db -o out.mcap")
+    _finish(folder, f"localize scenes.mcap --map site.db -o out.mcap {_SEEN}")
 
 
 def _row(case: Case, start: Path, trial: Path, kills: int) -> Row:

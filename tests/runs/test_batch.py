@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 from pathlib import Path
 
@@ -105,3 +106,33 @@ def test_outputs_are_named_as_their_logs(tmp_path: Path) -> None:
         outputs_in(out, [out / "a.mcap"], ".mcap")
     with pytest.raises(UsageError, match=r"also writes .*a\.mcap"):
         outputs_in(tmp_path, [tmp_path / "a.bag", out / "a.bag"], ".mcap")
+
+
+ORPHANED = """
+import sys
+from pathlib import Path
+from mcap_landmarks.runs.batch import Task, run_tasks
+words = (sys.executable, "-c", "import os, sys; os.open(sys.argv[1], os.O_WRONLY); os.read(0, 1)", sys.argv[1])
+run_tasks([Task(Path("log"), Path("out"), words)], 1, print)
+"""
+
+
+def test_the_processes_hear_that_theirs_was_killed(tmp_path: Path) -> None:
+    """By the end of their input; else they would go on, and keep the next run from its outputs."""
+    gate = tmp_path / "gate"
+    os.mkfifo(gate)
+    killed = subprocess.Popen([sys.executable, "-c", ORPHANED, str(gate)])
+    with gate.open("rb") as running:  # opens when the task's process runs, and ends with it
+        killed.kill()
+        killed.wait()
+        assert running.read() == b""
+
+
+def test_a_command_of_a_batch_ends_with_its_input() -> None:
+    reading, writing = os.pipe()
+    with subprocess.Popen([sys.executable, "-m", "mcap_landmarks.batched", "--version"], stdin=reading) as living:
+        assert living.wait() == 0, "as long as the other end is open it does its work"
+    os.close(writing)
+    code = "from mcap_landmarks.batched import end_with_input; end_with_input()"
+    assert subprocess.run([sys.executable, "-c", code], stdin=reading, check=False).returncode == -signal.SIGKILL
+    os.close(reading)

@@ -28,7 +28,7 @@ _SUFFIX = {
 }
 _ONE_FILE = {"map": ("--map",), "evaluate": ("--tum", "--thesis")}
 _DETECTS = ("detect", "map", "localize", "run")
-_CALL = (sys.executable, "-m", "mcap_landmarks")
+_CALL = (sys.executable, "-m", "mcap_landmarks.batched")
 
 
 class _Report(TypedDict):

@@ -1,11 +1,12 @@
 """Many logs, one process each: a log that fails, or a process that is killed, takes no other with it."""
 
+import contextlib
 import glob
 import os
 import signal
 import subprocess
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
@@ -98,9 +99,10 @@ def run_tasks(tasks: Sequence[Task], workers: int, progress: Callable[[int], Non
     """Run the tasks, so many at a time, and tell how each ended, in their order; `progress` gets 1 for each.
 
     Numeric libraries use one thread per process. On Ctrl-C or SIGTERM the running ones get the same and are waited for.
+    The input of all is a pipe that ends with this process, however that ends; `mcap_landmarks.batched` heeds it.
     """
-    processes = _Processes()
-    with ThreadPoolExecutor(workers) as pool:
+    with _pipe() as input_, ThreadPoolExecutor(workers) as pool:
+        processes = _Processes(input_)
         futures = [pool.submit(processes.run, task) for task in tasks]
         try:
             for future in as_completed(futures):
@@ -113,10 +115,22 @@ def run_tasks(tasks: Sequence[Task], workers: int, progress: Callable[[int], Non
     return [future.result() for future in futures]
 
 
+@contextlib.contextmanager
+def _pipe() -> Iterator[int]:
+    """The end to read of a pipe that nothing is written to, and whose other end no other process has."""
+    reading, writing = os.pipe()
+    try:
+        yield reading
+    finally:
+        os.close(reading)
+        os.close(writing)
+
+
 class _Processes:
     """The processes that run at the moment."""
 
-    def __init__(self) -> None:
+    def __init__(self, input_: int) -> None:
+        self._input = input_
         self._lock = threading.Lock()
         self._running: set[subprocess.Popen[str]] = set()
         self._stopped = False
@@ -128,7 +142,7 @@ class _Processes:
                 return Ended(task, -signal.SIGINT, "", "")
             process = subprocess.Popen(
                 task.command,
-                stdin=subprocess.DEVNULL,
+                stdin=self._input,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 encoding="utf-8",
