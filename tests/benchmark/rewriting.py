@@ -12,7 +12,8 @@ from mcap_landmarks.progress import unwatched
 from mcap_landmarks.recording.chunk_copy import WholeChunk
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import create_recording
-from mcap_landmarks.runs.convert import OutputForm, convert
+from mcap_landmarks.runs.convert import convert
+from mcap_landmarks.runs.output_formats import OutputForm
 from mcap_landmarks.runs.splitting import Split
 from mcap_landmarks.runs.topic_selection import Selection
 from mcap_landmarks.stage import Connection, RawMessage

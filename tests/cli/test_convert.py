@@ -34,7 +34,9 @@ def test_the_document_fits_its_schema(tmp_path: Path, capsys: pytest.CaptureFixt
     found = document(capsys, write_ros1(tmp_path / "a.bag"), "-o", tmp_path / "a.mcap")
     assert found == {
         "schema": "mcap-landmarks/convert/1",
-        "outputs": [{"path": str(tmp_path / "a.mcap"), "messages": 80, "topics": {"/scan": 40, "/talk": 40}}],
+        "outputs": [
+            {"path": str(tmp_path / "a.mcap"), "format": "mcap", "messages": 80, "topics": {"/scan": 40, "/talk": 40}}
+        ],
         "declared": 80,
         "read": 80,
         "lost": 0,

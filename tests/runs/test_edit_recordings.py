@@ -14,7 +14,8 @@ from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.progress import unwatched
 from mcap_landmarks.recording.chunk_form import ChunkForm
 from mcap_landmarks.recording.writer import create_recording
-from mcap_landmarks.runs.convert import Conversion, OutputForm, convert
+from mcap_landmarks.runs.convert import Conversion, convert
+from mcap_landmarks.runs.output_formats import OutputForm
 from mcap_landmarks.runs.splitting import Split
 from mcap_landmarks.runs.topic_selection import Selection
 from mcap_landmarks.stage import Connection, RawMessage, Stamped

@@ -1,4 +1,4 @@
-"""Output files that appear whole or not at all, each written by one process at a time."""
+"""Output files and folders that appear whole or not at all, each written by one process at a time."""
 
 import contextlib
 import errno
@@ -6,6 +6,7 @@ import fcntl
 import os
 import re
 import secrets
+import shutil
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,11 +21,11 @@ _held: set[Path] = set()
 """The targets that this process holds."""
 
 
-def check_target(target: Location) -> Path:
-    """The path of a target; refuses one that cannot become a regular file. A link stands for what it leads to.
+def check_target(target: Location, *, is_folder: bool = False) -> Path:
+    """The path of a target; refuses one that cannot become a regular file, or a folder. A link stands for its end.
 
     Raises:
-        UsageError: it is not on this machine, its folder does not exist, or what has its name is no regular file.
+        UsageError: it is not on this machine, its folder does not exist, or what has its name is something else.
     """
     path = to_write(target)
     real = _real(path)
@@ -36,13 +37,15 @@ def check_target(target: Location) -> Path:
         return path
     except OSError as error:
         raise UsageError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
-    if not stat.S_ISREG(mode):
+    if is_folder and not stat.S_ISDIR(mode):
+        raise UsageError(f"{path} is not a folder; name one that may be written")
+    if not is_folder and not stat.S_ISREG(mode):
         raise UsageError(f"{path} is not a regular file; name a file that may be written")
     return path
 
 
 @contextlib.contextmanager
-def held(target: Location) -> Iterator[Path]:
+def held(target: Location, *, is_folder: bool = False) -> Iterator[Path]:
     """Keep every other process from writing a target while the block runs; the path that it has behind links.
 
     The lock ends with the process, however that ends. What a killed process left half written is removed.
@@ -51,7 +54,7 @@ def held(target: Location) -> Iterator[Path]:
         UsageError: see `check_target`.
         RecordingError: another process holds it, the disk is full, or the folder may not be written.
     """
-    path = _real(check_target(target))
+    path = _real(check_target(target, is_folder=is_folder))
     if path in _held:
         yield path
         return
@@ -78,16 +81,55 @@ def atomic_file(target: Location) -> Iterator[BinaryIO]:
     Raises:
         UsageError, RecordingError: see `held`.
     """
+    with atomic_path(target) as partial, partial.open("xb") as stream:
+        yield stream
+
+
+@contextlib.contextmanager
+def atomic_path(target: Location) -> Iterator[Path]:
+    """The path of a file to make, which takes the name `target` when the block ends well and else vanishes.
+
+    Raises:
+        UsageError, RecordingError: see `held`.
+    """
     with held(target) as path, _failing_as(target):
-        partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial")
+        partial = _beside(path)
         try:
-            with partial.open("xb") as stream:
-                yield stream
-                stream.flush()
+            yield partial
+            with partial.open("rb") as stream:
                 os.fsync(stream.fileno())
             partial.replace(path)
         finally:
             partial.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def atomic_folder(target: Location) -> Iterator[Path]:
+    """A folder to fill, which takes the place of `target` when the block ends well and else vanishes.
+
+    Raises:
+        UsageError, RecordingError: see `held`.
+    """
+    with held(target, is_folder=True) as path, _failing_as(target):
+        partial, old = _beside(path), _beside(path)
+        try:
+            partial.mkdir()
+            yield partial
+            if path.exists():
+                path.rename(old)
+            try:
+                partial.rename(path)
+            except OSError:
+                old.rename(path)
+                raise
+        finally:
+            for folder in (partial, old):
+                _remove(folder)
+
+
+def _beside(path: Path) -> Path:
+    """A hidden name that is free, and known for a left-over if it is not removed."""
+    return path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial")
 
 
 def _real(path: Path) -> Path:
@@ -125,7 +167,14 @@ def _remove_left_over(path: Path) -> None:
     left_over = re.compile(rf"\.{re.escape(path.name)}\.[0-9a-f]{{8}}\.partial")
     for entry in list(path.parent.iterdir()):
         if left_over.fullmatch(entry.name):
-            entry.unlink(missing_ok=True)
+            _remove(entry)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager

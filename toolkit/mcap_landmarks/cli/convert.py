@@ -8,6 +8,7 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, warn
 from mcap_landmarks.cli.conversion_options import FormOptions, SelectionOptions
 from mcap_landmarks.cli.option_groups import reading_logs
+from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
 from mcap_landmarks.wording import counted
 
@@ -24,9 +25,17 @@ def command(
             metavar="SRC...", parser=location, help="ROS 1 .bag; ROS 2 folder, .db3 or .mcap; MRCLAM folder or .zip."
         ),
     ],
-    output: options.Output,
+    output: Annotated[
+        str,
+        typer.Option(
+            "-o", "--output", metavar="OUT", help="A file named .mcap, or a folder for one file per log or a ROS 2 bag."
+        ),
+    ],
     chosen: SelectionOptions,
     shape: FormOptions,
+    to: Annotated[
+        str, typer.Option("--to", metavar="mcap|rosbag2", help="Format: rosbag2 is a folder for `ros2 bag play`.")
+    ] = "mcap",
     distro: options.Distro = None,
     definitions: options.Definitions = None,
     strict: Annotated[
@@ -43,15 +52,18 @@ def command(
     robots gives one file per robot, in a folder.
     """
     from mcap_landmarks.config import gather
-    from mcap_landmarks.runs.convert import OutputForm, convert
+    from mcap_landmarks.runs.convert import convert
+    from mcap_landmarks.runs.output_formats import OutputForm, OutputFormat
 
     given = gather(config_file, settings or [], None)
     options.add_definitions(given, distro, definitions)
-    form = OutputForm(shape.split(), shape.form())
+    if to not in set(OutputFormat):
+        raise UsageError(f"--to {to}: choose {' or '.join(OutputFormat)}")
+    form = OutputForm(shape.split(), shape.form(), OutputFormat(to), names_folder=output.endswith("/"))
     beside = [config_file] if config_file else []
     conversion = convert(
         inputs,
-        output,
+        location(output),
         chosen.selection(),
         given,
         progress,
@@ -87,7 +99,8 @@ def _report(done: "Converted") -> None:
 
 def _print(conversion: "Conversion") -> None:
     for done in conversion.outputs:
-        say(f"{done.path}: {counted(done.topics.total(), 'message')}, {counted(len(done.topics), 'topic')}")
+        name = f"{done.path}/" if done.path.is_dir() else done.path
+        say(f"{name}: {counted(done.topics.total(), 'message')}, {counted(len(done.topics), 'topic')}")
 
 
 def _document(conversion: "Conversion") -> dict[str, object]:
@@ -97,7 +110,12 @@ def _document(conversion: "Conversion") -> dict[str, object]:
             dropped[reason] = dropped.get(reason, 0) + count
     return {
         "outputs": [
-            {"path": str(done.path), "messages": done.topics.total(), "topics": dict(sorted(done.topics.items()))}
+            {
+                "path": str(done.path),
+                "format": done.format,
+                "messages": done.topics.total(),
+                "topics": dict(sorted(done.topics.items())),
+            }
             for done in conversion.outputs
         ],
         "declared": sum(done.declared for done in conversion.outputs),

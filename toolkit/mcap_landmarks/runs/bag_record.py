@@ -1,10 +1,10 @@
 """What of the metadata of bags is true of what was made of them: who recorded it with what, and what they noted."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from mcap_landmarks.messages.qos import KEY
-from mcap_landmarks.runs.rosbag2_metadata import BagMetadata, BagTopic, record_of
+from mcap_landmarks.runs.rosbag2_metadata import BagMetadata, BagTopic, joined_profiles, record_of
 from mcap_landmarks.sources import BagDescription
 from mcap_landmarks.stage import Connection
 
@@ -23,20 +23,20 @@ def custom_data_of(told: Told) -> tuple[dict[str, str], list[str]]:
     return {key: value for key, (_, value) in found.items()}, notes
 
 
-def bag_record(told: Told, counts: Mapping[Connection, int], span_ns: Sequence[int]) -> dict[str, str] | None:
-    """The `rosbag2` record of an output with so many messages; None if no input had anything to tell.
-
-    `span_ns` are the first and last log time, nothing if there are no messages.
-    """
+def bag_of(told: Told, counts: Mapping[Connection, int], span_ns: Sequence[int]) -> BagMetadata:
+    """An output with so many messages as a bag; `span_ns` are the first and last log time, nothing without messages."""
     distributions = dict.fromkeys(about.distribution for _, about in told if about.distribution)
-    custom_data, _ = custom_data_of(told)
-    if not distributions and not custom_data:
-        return None
     distribution = next(iter(distributions)) if len(distributions) == 1 else ""
     start_ns, end_ns = span_ns or (None, None)
-    return record_of(
-        BagMetadata("mcap", topics_of(counts), start_ns, end_ns, distribution=distribution, custom_data=custom_data)
-    )
+    custom_data, _ = custom_data_of(told)
+    return BagMetadata("mcap", topics_of(counts), start_ns, end_ns, distribution=distribution, custom_data=custom_data)
+
+
+def bag_record(told: Told, counts: Mapping[Connection, int], span_ns: Sequence[int]) -> dict[str, str] | None:
+    """The `rosbag2` record of such an output; None if no input had anything to tell."""
+    bag = bag_of(told, counts, span_ns)
+    has_told = bag.custom_data or any(about.distribution for _, about in told)
+    return record_of(bag) if has_told else None
 
 
 def topics_of(counts: Mapping[Connection, int]) -> list[BagTopic]:
@@ -51,12 +51,8 @@ def topics_of(counts: Mapping[Connection, int]) -> list[BagTopic]:
             topic,
             ones[0].message_type,
             messages[topic],
-            _lines(one.metadata.get(KEY, "") for one in ones),
+            joined_profiles(one.metadata.get(KEY, "") for one in ones),
             ones[0].metadata.get("topic_type_hash", ""),
         )
         for topic, ones in sorted(connections.items())
     ]
-
-
-def _lines(texts: Iterable[str]) -> str:
-    return "\n".join(dict.fromkeys(text for text in texts if text))

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 
@@ -16,11 +16,12 @@ from mcap_landmarks.recording.chunk_copy import WholeChunk
 from mcap_landmarks.recording.chunk_form import ChunkForm
 from mcap_landmarks.recording.latched import carried_note
 from mcap_landmarks.recording.writer import ROS2, RecordingWriter, create_recording, profile_of
-from mcap_landmarks.runs.bag_record import bag_record, custom_data_of
+from mcap_landmarks.runs.bag_record import Told, bag_of, bag_record, custom_data_of
 from mcap_landmarks.runs.conversion_inputs import ConversionInputs
 from mcap_landmarks.runs.input_hashes import HashOf
 from mcap_landmarks.runs.loss_report import REPORT, loss_report
-from mcap_landmarks.runs.rosbag2_metadata import RECORD
+from mcap_landmarks.runs.output_formats import OutputFormat
+from mcap_landmarks.runs.rosbag2_metadata import RECORD, BagFile, BagMetadata, record_of
 from mcap_landmarks.sources import OmittedTopic, definition_files
 from mcap_landmarks.stage import Connection, RawMessage
 
@@ -35,6 +36,7 @@ class Converted:
     """
 
     path: Path
+    format: OutputFormat = OutputFormat.MCAP
     topics: Counter[str] = field(default_factory=Counter)
     declared: int = 0
     lost: int = 0
@@ -66,6 +68,9 @@ class Job:
     ) -> None:
         self.inputs, self._hash_of, self._form, self._verb = inputs, hash_of, form, verb
         self._read: Counter[Connection] = Counter()
+        self._written: Counter[Connection] = Counter()
+        self._files: list[BagFile] = []
+        self._has_attached = False
 
     def run(self, target: Path, advance: Progress) -> Converted:
         """Write the one output.
@@ -87,7 +92,9 @@ class Job:
             NoMessagesError, RecordingError: see `run`.
         """
         done, (start_ns, _) = Converted(target), span
-        carried = [] if start_ns is None else self.inputs.before(start_ns)
+        is_first = start_ns == self.inputs.selection.start_ns
+        is_read_alone = is_first or self.inputs.to is OutputFormat.MCAP
+        carried = self.inputs.before(start_ns) if start_ns is not None and is_read_alone else []
         profile = profile_of(self.inputs.connections)
         if profile != ROS2:
             done.notes.append(_told_others(self.inputs.connections))
@@ -105,8 +112,10 @@ class Job:
                 done.notes.append(carried_note(on_topics))
                 writer.metadata[RUN][CARRIED] = entry_text(on_topics)
             self._carry_over(writer, done, counts)
+            self._files.append(BagFile(target.name, done.topics.total(), *writer.times_ns()))
+            self._written.update(counts)
             self._read.update(counts)
-            if start_ns != self.inputs.selection.start_ns:  # an earlier part has them, too
+            if not is_first:  # an earlier part has them, too
                 self._read.subtract(raw.connection for raw in carried)
             if is_last:
                 self.account(done)
@@ -115,14 +124,26 @@ class Job:
         return done
 
     def _carry_over(self, writer: RecordingWriter, done: Converted, counts: Mapping[Connection, int]) -> None:
-        """Attachments, and what rosbag2 keeps of a bag as a whole where the inputs have that."""
-        told = [one for log in self.inputs.logs for one in log.told]
-        done.notes += custom_data_of(told)[1]
-        if record := bag_record(told, counts, writer.times_ns()):
+        """Attachments, which the first of several parts has, and what rosbag2 keeps of a bag as a whole."""
+        done.notes += custom_data_of(self._told)[1]
+        if self.inputs.to is OutputFormat.ROSBAG2:
+            writer.metadata[RECORD] = record_of(bag_of(self._told, counts, writer.times_ns()))
+        elif record := bag_record(self._told, counts, writer.times_ns()):
             writer.metadata[RECORD] = record
-        for part in self.inputs.parts:
+        for part in () if self._has_attached else self.inputs.parts:
             if isinstance(part, McapLog):
                 part.copy_attachments(writer)
+        self._has_attached = True
+
+    @property
+    def _told(self) -> Told:
+        return [one for log in self.inputs.logs for one in log.told]
+
+    def bag(self) -> BagMetadata:
+        """What was written, as the files of one bag."""
+        times = [time for file in self._files for time in (file.start_ns, file.end_ns) if time is not None]
+        bag = bag_of(self._told, self._written, (min(times), max(times)) if times else ())
+        return replace(bag, files=tuple(self._files))
 
     def account(self, done: Converted) -> None:
         """Compare what was read for all outputs with what the storage declares, and say it with this one."""

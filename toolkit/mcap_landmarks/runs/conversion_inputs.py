@@ -2,24 +2,28 @@
 
 import re
 from collections import Counter
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.inspection.mcap_log import McapLog
 from mcap_landmarks.inspection.open_logs import OpenLog
-from mcap_landmarks.messages.qos import KEY
+from mcap_landmarks.messages.qos import KEY, numbered
 from mcap_landmarks.moments import moment
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.chunk_copy import WholeChunk
 from mcap_landmarks.recording.latched import latched, latest
 from mcap_landmarks.recording.summary_index import Block
 from mcap_landmarks.recording.writer import RecordingWriter
+from mcap_landmarks.runs.output_formats import OutputFormat, refusal
+from mcap_landmarks.runs.rosbag2_metadata import joined_profiles
 from mcap_landmarks.runs.splitting import TimedBytes
 from mcap_landmarks.runs.topic_selection import Selection
-from mcap_landmarks.sources import Piece, merge, together
+from mcap_landmarks.sources import OmittedTopic, Piece, merge, together
 from mcap_landmarks.stage import Connection, RawMessage
 
+_TWO_TYPES = "other messages of the topic have another type or definition, and a bag's topic has one; --types chooses"
 _COMMENT = re.compile(rb"#[^\n]*")
 
 
@@ -27,15 +31,17 @@ class ConversionInputs:
     """Logs, and the connection that stands in the output for each wanted one of theirs: equal ones share theirs.
 
     `declared` are the messages by connection of the output that the storage declares. `left_out` are wanted topics that
-    nobody can understand.
+    nobody can understand, or that the format `to` cannot hold.
 
     Raises:
         RecordingError: no topic can be carried, or with `strict` one cannot.
         UsageError: the selection does not fit the logs.
     """
 
-    def __init__(self, logs: Sequence[OpenLog], selection: Selection, *, strict: bool) -> None:
-        self.logs, self.selection = logs, selection
+    def __init__(
+        self, logs: Sequence[OpenLog], selection: Selection, *, strict: bool, to: OutputFormat = OutputFormat.MCAP
+    ) -> None:
+        self.logs, self.selection, self.to = logs, selection, to
         self.parts = [part for log in logs for part in log.parts]
         for log in logs:
             log.verify(selection.may_want)
@@ -53,11 +59,38 @@ class ConversionInputs:
         if not self.left_out:
             self.selection.check((entry.connection for entry in entries), self.where)
         for entry in entries:
-            if self.selection.wants(entry.connection.topic, entry.connection.message_type):
-                renamed = self.selection.renamed(entry.connection)
-                unified[entry.connection] = known.setdefault(_identity(renamed), renamed)
+            connection = entry.connection
+            if not self.selection.wants(connection.topic, connection.message_type):
+                continue
+            if reason := refusal(self.to, connection):
+                omitted = OmittedTopic(connection.topic, connection.message_type, entry.count, reason)
+                self.left_out = together([*self.left_out, omitted])
+                continue
+            renamed = self.selection.renamed(connection)
+            unified[connection] = known.setdefault(_identity(renamed), renamed)
+        if self.to is not OutputFormat.MCAP:
+            unified = self._by_topic(unified)
+        for entry in entries:
+            if entry.connection in unified:
                 self.declared[unified[entry.connection]] += entry.count
         return unified
+
+    def _by_topic(self, unified: Mapping[Connection, Connection]) -> dict[Connection, Connection]:
+        """Connections as bags have them: one of each topic, with the profiles of all, as every version reads them."""
+        several: dict[str, list[Connection]] = {}
+        for own in dict.fromkeys(unified.values()):
+            several.setdefault(own.topic, []).append(own)
+        stands: dict[Connection, Connection] = {}
+        for ones in several.values():
+            alike = [one for one in ones if _identity(one)[:-1] == _identity(ones[0])[:-1]]
+            profiles = joined_profiles(one.metadata.get(KEY, "") for one in alike)
+            first = replace(ones[0], metadata={**ones[0].metadata, KEY: numbered(profiles)})
+            stands.update(dict.fromkeys(alike, first))
+        counts = {entry.connection: entry.count for part in self.parts for entry in part.channels}
+        others = [one for one, own in unified.items() if own not in stands]
+        omitted = (OmittedTopic(one.topic, one.message_type, counts[one], _TWO_TYPES) for one in others)
+        self.left_out = together([*self.left_out, *omitted])
+        return {one: stands[own] for one, own in unified.items() if own in stands}
 
     @property
     def connections(self) -> list[Connection]:

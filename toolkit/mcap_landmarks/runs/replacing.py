@@ -29,17 +29,22 @@ class Replacing:
 
 @contextlib.contextmanager
 def output_to(
-    target: Location, read: Iterable[Location], is_earlier: IsEarlier, *, overwrite: bool = False
+    target: Location,
+    read: Iterable[Location],
+    is_earlier: IsEarlier,
+    *,
+    overwrite: bool = False,
+    is_folder: bool = False,
 ) -> Iterator[Path]:
-    """The path of an output, which no other process writes while the block runs and which the block may replace.
+    """The path of an output, a file or a folder; no other process writes it while the block runs, which may replace it.
 
     Raises:
         UsageError: it cannot be written, is one of the files that are `read`, or has to stay (see `check_replaceable`).
         RecordingError: another process writes it, or the folder may not be written.
     """
-    path = check_target(target)
+    path = check_target(target, is_folder=is_folder)
     check_apart([path], read)
-    with held(path):
+    with held(path, is_folder=is_folder):
         check_replaceable(path, is_earlier, overwrite=overwrite)
         yield path
 
@@ -80,6 +85,8 @@ def check_apart(targets: Collection[Location], read: Iterable[Location]) -> None
                 raise UsageError(f"{path} is {named}; write to another file")
             if source.is_dir() and _is_in(path, source):
                 raise UsageError(f"{path} is part of the input {source}; write to another file")
+            if path.is_dir() and _is_in(source, path):
+                raise UsageError(f"{path} holds the input {source}; write to another folder")
 
 
 def check_replaceable(path: Path, is_earlier: IsEarlier, *, overwrite: bool) -> None:

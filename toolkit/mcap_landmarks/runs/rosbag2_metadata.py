@@ -1,14 +1,19 @@
 """What rosbag2 keeps of a bag as a whole: the text of metadata.yaml, and of the metadata record of MCAP."""
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from mcap_landmarks.messages.qos import is_named, named, numbered
 
 RECORD = "rosbag2"
 KEY = "serialized_metadata"
-_VERSION = 8  # Iron's: the last one that keeps QoS as text, as channels do; every later rosbag2 reads it
+_OF_TEXT, _OF_NAMES = 8, 9
+"""The versions of Iron and Jazzy. The first keeps profiles as text with numbers, which every later rosbag2 reads. By
+the second it reads names, also those of the channels, and takes numbers for unknown."""
 _NEVER_NS = 2**63 - 1  # what rosbag2 writes as the start of a bag without messages
 
 
@@ -29,8 +34,8 @@ class BagFile:
 
     name: str
     messages: int
-    start_ns: int | None
-    end_ns: int | None
+    start_ns: int | None = None
+    end_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +62,8 @@ def metadata_yaml(bag: BagMetadata) -> str:
 
 
 def _about(bag: BagMetadata) -> dict[str, object]:
-    about: dict[str, object] = {"version": _VERSION, "storage_identifier": bag.storage}
+    names = any(is_named(topic.qos) for topic in bag.topics)
+    about: dict[str, object] = {"version": _OF_NAMES if names else _OF_TEXT, "storage_identifier": bag.storage}
     about |= _lasts(bag.start_ns, bag.end_ns)
     about["message_count"] = sum(topic.messages for topic in bag.topics)
     about["topics_with_message_count"] = [
@@ -66,7 +72,7 @@ def _about(bag: BagMetadata) -> dict[str, object]:
                 "name": topic.name,
                 "type": topic.message_type,
                 "serialization_format": "cdr",
-                "offered_qos_profiles": topic.qos,
+                "offered_qos_profiles": _profiles(topic.qos) if names else topic.qos,
                 "type_description_hash": topic.type_hash,
             },
             "message_count": topic.messages,
@@ -83,6 +89,24 @@ def _about(bag: BagMetadata) -> dict[str, object]:
     return about
 
 
+def joined_profiles(texts: Iterable[str]) -> str:
+    """The profiles of several publishers as one text; what cannot be read is left out, unless it is alone."""
+    found = list(dict.fromkeys(text.rstrip() for text in texts if text.strip() not in {"", "[]"}))
+    if len(found) < 2 or all(text.startswith("- ") for text in found):
+        return "\n".join(found)
+    profiles = [one for text in found for one in _profiles(text)]
+    return numbered(_text(profiles)).rstrip()
+
+
+def _profiles(text: str) -> list[object]:
+    """Profiles with names; none where the text cannot be read."""
+    try:
+        found = YAML(typ="safe", pure=True).load(named(text))
+    except YAMLError:
+        return []
+    return found if isinstance(found, list) else []
+
+
 def _lasts(start_ns: int | None, end_ns: int | None) -> dict[str, object]:
     if start_ns is None or end_ns is None:
         start_ns, end_ns = _NEVER_NS, _NEVER_NS
@@ -92,7 +116,7 @@ def _lasts(start_ns: int | None, end_ns: int | None) -> dict[str, object]:
     }
 
 
-def _text(document: Mapping[str, object]) -> str:
+def _text(document: object) -> str:
     yaml = YAML()
     yaml.width = 1 << 30
     stream = io.StringIO()

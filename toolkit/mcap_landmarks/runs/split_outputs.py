@@ -10,14 +10,18 @@ from mcap_landmarks.runs.replacing import Replacing, output_to
 from mcap_landmarks.runs.splitting import Split, cuts, spans
 
 
-def write_parts(job: Job, target: Path, split: Split, replacing: Replacing, advance: Progress) -> list[Converted]:
-    """Write the parts of what would be one output; each begins with what holds then, as a cut does.
+def write_parts(
+    job: Job, target: Path, split: Split | None, replacing: Replacing, advance: Progress
+) -> list[Converted]:
+    """Write the parts of what would be one output, or without a `split` the only one.
+
+    Each begins with what holds then, as a cut does.
 
     Raises:
         NoMessagesError: there is no message.
         RecordingError, UsageError: an output cannot be written, or there are files from another split.
     """
-    times = cuts(split, job.inputs.stretches(by_message=split.count is not None))
+    times = cuts(split, job.inputs.stretches(by_message=split.count is not None)) if split else []
     parts: list[Converted] = []
     for number, span in enumerate(spans(*job.inputs.selection.span, times)):
         path = target.with_stem(f"{target.stem}_{len(parts)}")

@@ -1,0 +1,88 @@
+"""The formats that a conversion writes: what their outputs are called, and what they cannot hold."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from mcap_landmarks.errors import UsageError
+from mcap_landmarks.inspection.open_logs import OpenLog
+from mcap_landmarks.recording.chunk_form import ChunkForm
+from mcap_landmarks.recording.writer import ROS2, profile_of
+from mcap_landmarks.runs.outputs import make_folder, output_files
+from mcap_landmarks.runs.splitting import Split
+from mcap_landmarks.stage import Connection
+
+
+class OutputFormat(StrEnum):
+    """What outputs are: recordings, or bags of ROS 2, which are folders."""
+
+    MCAP = "mcap"
+    ROSBAG2 = "rosbag2"
+
+
+@dataclass(frozen=True, slots=True)
+class OutputForm:
+    """How outputs are written: in which format, in parts, with chunks of another form; into a folder if it is named so.
+
+    Without `names_folder` an output is a file if it has the suffix of one.
+    """
+
+    split: Split | None = None
+    chunks: ChunkForm | None = None
+    to: OutputFormat = OutputFormat.MCAP
+    names_folder: bool = False
+
+
+_SUFFIXES = {OutputFormat.MCAP: ".mcap"}
+_FILES = {".mcap", ".bag", ".db3"}
+
+
+def refusal(to: OutputFormat, connection: Connection) -> str:
+    """Why a format cannot hold the messages of a connection, empty if it can."""
+    if to is OutputFormat.ROSBAG2 and profile_of([connection]) != ROS2:
+        return f"its messages are {connection.message_encoding or 'of no known encoding'}, and ROS 2 plays CDR only"
+    return ""
+
+
+def planned(logs: Sequence[OpenLog], output: Path, form: OutputForm) -> dict[Path, list[OpenLog]]:
+    """Which logs go into which output: all into one that is named, else each into one of its name in a folder.
+
+    Raises:
+        UsageError: the name is that of another format, or does not fit the logs.
+    """
+    several, own = len(logs) > len({log.path for log in logs}), _SUFFIXES.get(form.to, "")
+    is_file = output.suffix.lower() in _FILES and not (form.names_folder or output.is_dir())
+    if is_file and output.suffix.lower() != own:
+        raise UsageError(f"{output}: {_remedy(output, form.to)}")
+    if is_file and form.split:
+        raise UsageError(f"{output}: a split makes several files; give -o a folder, without {own}")
+    if is_file and several:
+        raise UsageError(f"{output}: the input holds {len(logs)} logs; give -o a folder, without {own}")
+    if is_file:
+        return {next(iter(output_files([output], output).values())): list(logs)}
+    if output.exists() and not output.is_dir():
+        raise UsageError(
+            f"{output} is a file and no folder; give the output another name" + f", as NAME{own}" * bool(own)
+        )
+    if form.to is OutputFormat.ROSBAG2 and not several:
+        return {output: list(logs)}
+    return _in_folder([f"{log.name}{own}" for log in logs], logs, output)
+
+
+def _remedy(output: Path, to: OutputFormat) -> str:
+    if to is OutputFormat.ROSBAG2:
+        return f"a ROS 2 bag is a folder; name it {output.stem}"
+    bag = f"-o {output.stem} --to rosbag2"
+    return f"convert writes MCAP; name the output {output.stem}.mcap, or make a ROS 2 bag with {bag}"
+
+
+def _in_folder(names: Collection[str], logs: Sequence[OpenLog], output: Path) -> dict[Path, list[OpenLog]]:
+    """One output per log."""
+    folder = make_folder(output)
+    plan: dict[Path, list[OpenLog]] = {}
+    for name, log in zip(names, logs, strict=True):
+        if folder / name in plan:
+            raise UsageError(f"{log.path}: another input also writes {folder / name}; convert it into another folder")
+        plan[folder / name] = [log]
+    return plan
