@@ -11,6 +11,7 @@ from mcap_landmarks.errors import UsageError
 
 if TYPE_CHECKING:
     from mcap_landmarks.recording.chunk_form import ChunkForm
+    from mcap_landmarks.runs.output_formats import OutputForm
     from mcap_landmarks.runs.splitting import Split
     from mcap_landmarks.runs.topic_selection import Selection
 
@@ -43,6 +44,12 @@ ChunkSize = Annotated[
 Compression = Annotated[
     str | None, typer.Option("--compression", metavar="zstd|lz4|none", help="Write all chunks anew, so compressed.")
 ]
+
+To = Annotated[str, typer.Option("--to", metavar="mcap|rosbag2", help="rosbag2 is a folder for `ros2 bag play`.")]
+OutputName = Annotated[
+    str, typer.Option("-o", "--output", metavar="OUT", help="A file NAME.mcap, or a folder: for files, or a ROS 2 bag.")
+]
+"""As text: a slash at its end says that it is a folder."""
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -84,6 +91,19 @@ class FormOptions:
     split_count: SplitCount = None
     chunk_size: ChunkSize = None
     compression: Compression = None
+    to: To = "mcap"
+
+    def output(self, *, names_folder: bool) -> "OutputForm":
+        """How outputs are written, whose name may say that it is a folder's.
+
+        Raises:
+            UsageError: an option cannot be read.
+        """
+        from mcap_landmarks.runs.output_formats import OutputForm, OutputFormat
+
+        if self.to not in set(OutputFormat):
+            raise UsageError(f"--to {self.to}: choose {' or '.join(OutputFormat)}")
+        return OutputForm(self.split(), self.form(), OutputFormat(self.to), names_folder=names_folder)
 
     def split(self) -> "Split | None":
         """Where outputs end, None for nowhere.

@@ -6,9 +6,8 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, warn
-from mcap_landmarks.cli.conversion_options import FormOptions, SelectionOptions
+from mcap_landmarks.cli.conversion_options import FormOptions, OutputName, SelectionOptions
 from mcap_landmarks.cli.option_groups import reading_logs
-from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
 from mcap_landmarks.wording import counted
 
@@ -25,17 +24,9 @@ def command(
             metavar="SRC...", parser=location, help="ROS 1 .bag; ROS 2 folder, .db3 or .mcap; MRCLAM folder or .zip."
         ),
     ],
-    output: Annotated[
-        str,
-        typer.Option(
-            "-o", "--output", metavar="OUT", help="A file named .mcap, or a folder for one file per log or a ROS 2 bag."
-        ),
-    ],
+    output: OutputName,
     chosen: SelectionOptions,
     shape: FormOptions,
-    to: Annotated[
-        str, typer.Option("--to", metavar="mcap|rosbag2", help="Format: rosbag2 is a folder for `ros2 bag play`.")
-    ] = "mcap",
     distro: options.Distro = None,
     definitions: options.Definitions = None,
     strict: Annotated[
@@ -53,13 +44,10 @@ def command(
     """
     from mcap_landmarks.config import gather
     from mcap_landmarks.runs.convert import convert
-    from mcap_landmarks.runs.output_formats import OutputForm, OutputFormat
 
     given = gather(config_file, settings or [], None)
     options.add_definitions(given, distro, definitions)
-    if to not in set(OutputFormat):
-        raise UsageError(f"--to {to}: choose {' or '.join(OutputFormat)}")
-    form = OutputForm(shape.split(), shape.form(), OutputFormat(to), names_folder=output.endswith("/"))
+    form = shape.output(names_folder=output.endswith("/"))
     beside = [config_file] if config_file else []
     conversion = convert(
         inputs,
