@@ -93,8 +93,7 @@ class Job:
         """
         done, (start_ns, _) = Converted(target), span
         is_first = start_ns == self.inputs.selection.start_ns
-        is_read_alone = is_first or self.inputs.to is OutputFormat.MCAP
-        carried = self.inputs.before(start_ns) if start_ns is not None and is_read_alone else []
+        carried = self._carried(start_ns)
         profile = profile_of(self.inputs.connections)
         if profile != ROS2:
             done.notes.append(_told_others(self.inputs.connections))
@@ -122,6 +121,11 @@ class Job:
             if lost := done.told_losses():
                 writer.metadata[REPORT] = loss_report(done.declared, done.topics.total(), lost)
         return done
+
+    def _carried(self, start_ns: int | None) -> list[RawMessage]:
+        """What holds at a start; a part of a bag is not read alone, so that only the first one needs it."""
+        is_read_alone = start_ns == self.inputs.selection.start_ns or self.inputs.to is OutputFormat.MCAP
+        return self.inputs.before(start_ns) if start_ns is not None and is_read_alone else []
 
     def _carry_over(self, writer: RecordingWriter, done: Converted, counts: Mapping[Connection, int]) -> None:
         """Attachments, which the first of several parts has, and what rosbag2 keeps of a bag as a whole."""

@@ -80,12 +80,7 @@ class ConversionInputs:
         several: dict[str, list[Connection]] = {}
         for own in dict.fromkeys(unified.values()):
             several.setdefault(own.topic, []).append(own)
-        stands: dict[Connection, Connection] = {}
-        for ones in several.values():
-            alike = [one for one in ones if _identity(one)[:-1] == _identity(ones[0])[:-1]]
-            profiles = joined_profiles(one.metadata.get(KEY, "") for one in alike)
-            first = replace(ones[0], metadata={**ones[0].metadata, KEY: numbered(profiles)})
-            stands.update(dict.fromkeys(alike, first))
+        stands = {one: first for ones in several.values() for one, first in _as_one(ones).items()}
         counts = {entry.connection: entry.count for part in self.parts for entry in part.channels}
         others = [one for one, own in unified.items() if own not in stands]
         omitted = (OmittedTopic(one.topic, one.message_type, counts[one], _TWO_TYPES) for one in others)
@@ -197,3 +192,11 @@ def _identity(connection: Connection) -> tuple[object, ...]:
     quality = connection.metadata.get(KEY)
     encodings = connection.message_encoding, connection.schema_encoding
     return connection.topic, connection.message_type, encodings, definition, quality
+
+
+def _as_one(connections: Sequence[Connection]) -> dict[Connection, Connection]:
+    """What stands for those of a topic that have the type of the first one: that, with the profiles of all."""
+    first = connections[0]
+    alike = [one for one in connections if _identity(one)[:-1] == _identity(first)[:-1]]
+    profiles = joined_profiles(one.metadata.get(KEY, "") for one in alike)
+    return dict.fromkeys(alike, replace(first, metadata={**first.metadata, KEY: numbered(profiles)}))

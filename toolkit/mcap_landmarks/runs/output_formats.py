@@ -52,14 +52,8 @@ def planned(logs: Sequence[OpenLog], output: Path, form: OutputForm) -> dict[Pat
         UsageError: the name is that of another format, or does not fit the logs.
     """
     several, own = len(logs) > len({log.path for log in logs}), _SUFFIXES.get(form.to, "")
-    is_file = output.suffix.lower() in _FILES and not (form.names_folder or output.is_dir())
-    if is_file and output.suffix.lower() != own:
-        raise UsageError(f"{output}: {_remedy(output, form.to)}")
-    if is_file and form.split:
-        raise UsageError(f"{output}: a split makes several files; give -o a folder, without {own}")
-    if is_file and several:
-        raise UsageError(f"{output}: the input holds {len(logs)} logs; give -o a folder, without {own}")
-    if is_file:
+    if output.suffix.lower() in _FILES and not (form.names_folder or output.is_dir()):
+        _check_file(output, form, len(logs) if several else 1)
         return {next(iter(output_files([output], output).values())): list(logs)}
     if output.exists() and not output.is_dir():
         raise UsageError(
@@ -68,6 +62,17 @@ def planned(logs: Sequence[OpenLog], output: Path, form: OutputForm) -> dict[Pat
     if form.to is OutputFormat.ROSBAG2 and not several:
         return {output: list(logs)}
     return _in_folder([f"{log.name}{own}" for log in logs], logs, output)
+
+
+def _check_file(output: Path, form: OutputForm, logs: int) -> None:
+    """Refuse the name of a file for what is of another format, or becomes several."""
+    own = _SUFFIXES.get(form.to)
+    if output.suffix.lower() != own:
+        raise UsageError(f"{output}: {_remedy(output, form.to)}")
+    if form.split:
+        raise UsageError(f"{output}: a split makes several files; give -o a folder, without {own}")
+    if logs > 1:
+        raise UsageError(f"{output}: the input holds {logs} logs; give -o a folder, without {own}")
 
 
 def _remedy(output: Path, to: OutputFormat) -> str:

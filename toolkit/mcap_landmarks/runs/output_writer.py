@@ -25,7 +25,10 @@ from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.layered_log import Layer, LayeredLog, own_layer
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.recording.writer import RecordingWriter, create_recording, profile_of
+from mcap_landmarks.runs.bag_record import bag_of
+from mcap_landmarks.runs.rosbag2_metadata import RECORD, record_of
 from mcap_landmarks.runs.session import Session
+from mcap_landmarks.sources import recorded_metadata
 from mcap_landmarks.stage import Connection, RawMessage
 
 
@@ -86,9 +89,17 @@ def _write(
                 writer.write(piece if connection is None else piece._replace(connection=connection))
         for attachment in () if session.request.results_only else source.attachments():
             writer.attach(attachment)
+        _renew(writer, source)
         told = {LOSSES: source.losses, CARRIED: counts}
         writer.metadata[RUN].update({name: entry_text(value) for name, value in told.items() if value})
     return list(source.losses), counts
+
+
+def _renew(writer: RecordingWriter, source: Recording) -> None:
+    """Have what rosbag2 keeps of a bag as a whole, if the log has that, say what is in the output."""
+    if RECORD in writer.metadata:
+        told, counts = recorded_metadata(source.metadata), {one: writer.count(one) for one in writer.declared().ids}
+        writer.metadata[RECORD] = record_of(bag_of([("", told)], counts, writer.times_ns()))
 
 
 def _before(view: LayeredLog, start_ns: int) -> list[RawMessage]:
@@ -129,15 +140,20 @@ def _is_there(
     source: Recording,
 ) -> bool:
     """Whether an earlier output holds all that would be written."""
-    own_entries = {k: v for k, v in earlier.metadata.get(RUN, {}).items() if k not in {CONTENT, LOSSES, CARRIED}}
-    found = {**earlier.metadata, RUN: own_entries}
     return (
         earlier.is_ours
-        and found == metadata
+        and _lasting(earlier.metadata) == _lasting(metadata)
+        and recorded_metadata(earlier.metadata).custom_data == recorded_metadata(metadata).custom_data
         and all(layer.recording is earlier for layer in results)
         and _topics(own_layer(earlier)) == _topics(own)
         and (not own.channels or list(earlier.attachments()) == list(source.attachments()))
     )
+
+
+def _lasting(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, Mapping[str, str]]:
+    """The records but for what depends on the content."""
+    entries = {k: v for k, v in metadata.get(RUN, {}).items() if k not in {CONTENT, LOSSES, CARRIED}}
+    return {**{name: record for name, record in metadata.items() if name != RECORD}, RUN: entries}
 
 
 def _topics(layer: Layer) -> list[tuple[str, str]]:

@@ -80,13 +80,17 @@ def check_apart(targets: Collection[Location], read: Iterable[Location]) -> None
             raise UsageError(f"{path}: two outputs would be this file; give each a name of its own")
     for path in filter(Path.exists, paths):
         for source in sources:
-            if _is_same(path, source):
-                named = "the input itself" if path == source else f"the input {source} itself"
-                raise UsageError(f"{path} is {named}; write to another file")
-            if source.is_dir() and _is_in(path, source):
-                raise UsageError(f"{path} is part of the input {source}; write to another file")
-            if path.is_dir() and _is_in(source, path):
-                raise UsageError(f"{path} holds the input {source}; write to another folder")
+            _check_pair(path, source)
+
+
+def _check_pair(path: Path, source: Path) -> None:
+    if _is_same(path, source):
+        named = "the input itself" if path == source else f"the input {source} itself"
+        raise UsageError(f"{path} is {named}; write to another file")
+    if source.is_dir() and _is_in(path, source):
+        raise UsageError(f"{path} is part of the input {source}; write to another file")
+    if path.is_dir() and _is_in(source, path):
+        raise UsageError(f"{path} holds the input {source}; write to another folder")
 
 
 def check_replaceable(path: Path, is_earlier: IsEarlier, *, overwrite: bool) -> None:
