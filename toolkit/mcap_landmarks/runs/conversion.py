@@ -93,7 +93,7 @@ class Job:
         """
         done, (start_ns, _) = Converted(target), span
         is_first = start_ns == self.inputs.selection.start_ns
-        carried = self._carried(start_ns)
+        carried = self.holding(start_ns)
         profile = profile_of(self.inputs.connections)
         if profile != ROS2:
             done.notes.append(_told_others(self.inputs.connections))
@@ -122,7 +122,7 @@ class Job:
                 writer.metadata[REPORT] = loss_report(done.declared, done.topics.total(), lost)
         return done
 
-    def _carried(self, start_ns: int | None) -> list[RawMessage]:
+    def holding(self, start_ns: int | None) -> list[RawMessage]:
         """What holds at a start; a part of a bag is not read alone, so that only the first one needs it."""
         is_read_alone = start_ns == self.inputs.selection.start_ns or self.inputs.to is OutputFormat.MCAP
         return self.inputs.before(start_ns) if start_ns is not None and is_read_alone else []

@@ -101,5 +101,3 @@ def _written(job: Job, target: Path, form: OutputForm, replacing: Replacing, adv
         return write_parts(job, target, form.split, replacing, advance)
     with output_to(target, (), replacing.is_earlier, overwrite=replacing.overwrite):
         return [job.run(target, advance)]
-
-
