@@ -148,14 +148,14 @@ def _indexed(stream: BinaryIO, block: Block, content: memoryview) -> Indices | N
 
 def _are_all(content: memoryview, starts: Indices, heads: Heads) -> bool:
     """Whether records at these places are messages, do not overlap, and there is none between them."""
-    length = heads["length"]
-    if not ((heads["opcode"] == Opcode.MESSAGE) & (length >= MESSAGE_FIXED) & (length <= len(content))).all():
+    length = heads["length"].astype(np.int64)  # one beyond 2^63 is negative then
+    if (heads["opcode"] != Opcode.MESSAGE).any() or length.min() < MESSAGE_FIXED or length.max() > len(content):
         return False
-    ends = np.concatenate([[0], starts + RECORD.size + length.astype(np.int64)])
+    ends = np.concatenate([[0], starts + length + RECORD.size])
     begins = np.concatenate([starts, [len(content)]])
-    if (begins < ends).any():
+    gaps = np.flatnonzero(begins != ends)  # most often one, of the definitions at the chunk's begin
+    if (begins[gaps] < ends[gaps]).any():
         return False
-    gaps = np.flatnonzero(begins > ends)  # most often one, of the definitions at the chunk's begin
     try:
         between = [content[ends[gap] : begins[gap]] for gap in gaps.tolist()]
         return all(opcode != Opcode.MESSAGE for piece in between for opcode, _, _ in records_in(piece))
