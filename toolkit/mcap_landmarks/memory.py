@@ -16,6 +16,9 @@ _UNITS = {"": 1, "K": 1 << 10, "M": 1 << 20, "G": 1 << 30, "T": 1 << 40}
 _MANY = 8 << 20
 """Contents of more bytes than this are not taken apart into objects at once: these are up to 15 times as large."""
 
+_LANDMARK = 4 << 10
+"""Bytes that a landmark takes at most in one of the verbs (measured with 200,000: import 1.6 KB, show as JSON 4 KB)."""
+
 T = TypeVar("T")
 _T_co = TypeVar("_T_co", covariant=True)
 
@@ -65,6 +68,13 @@ def check(place: object, claimed: int, given: int, small: int = SMALL) -> None:
     """
     if problem := excess(claimed, given, small):
         raise RecordingError(f"{place}: {problem}")
+
+
+def excess_of_landmarks(count: int) -> str | None:
+    """Why a map of so many landmarks is not read, in words; None where it may be."""
+    if count * _LANDMARK <= bound():
+        return None
+    return f"{count} landmarks take {shown(count * _LANDMARK)} as objects; if that is right, allow it with --max-memory"
 
 
 def shown(size: int) -> str:

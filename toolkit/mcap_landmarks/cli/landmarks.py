@@ -10,6 +10,8 @@ from mcap_landmarks.locations import Location, location
 from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from mcap_landmarks.maps.exchange import Format
     from mcap_landmarks.maps.model import LandmarkMap
 
@@ -85,11 +87,11 @@ def show(database: Database, json: options.Json = False) -> None:
         _print(database, landmark_map)
 
 
-def _mark(landmark_map: "LandmarkMap", i: int) -> str:
-    """What is to be known of a landmark beside its class."""
-    marks = {"tentative": landmark_map.tentative[i], "movable": landmark_map.movable[i]}
-    told = ", ".join(word for word, holds in marks.items() if holds)
-    return f" ({told})" if told else ""
+def _marks(landmark_map: "LandmarkMap") -> "Iterator[str]":
+    """What is to be known of each landmark beside its class."""
+    for tentative, movable in zip(landmark_map.tentative, landmark_map.movable, strict=True):
+        told = ", ".join(word for word, holds in (("tentative", tentative), ("movable", movable)) if holds)
+        yield f" ({told})" if told else ""
 
 
 def _print(database: Location, landmark_map: "LandmarkMap") -> None:
@@ -103,13 +105,13 @@ def _print(database: Location, landmark_map: "LandmarkMap") -> None:
     rows = [
         [
             identity,
-            landmark_map.classes[i] + _mark(landmark_map, i),
+            landmark_map.classes[i] + mark,
             *(f"{value:.4f}" for value in landmark_map.positions_xy[i]),
             f"{sigma_m[i]:.4f}" if sigma_m[i] > 0 else "-",
             f"{landmark_map.radii_m[i]:.3f}" if landmark_map.radii_m[i] > 0 else "-",
             str(landmark_map.sightings[i]),
         ]
-        for i, identity in enumerate(landmark_map.ids)
+        for i, (identity, mark) in enumerate(zip(landmark_map.ids, _marks(landmark_map), strict=True))
     ]
     say()
     table(["id", "class", "x [m]", "y [m]", "sigma [m]", "radius [m]", "sightings"], rows)

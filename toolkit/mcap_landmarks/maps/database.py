@@ -8,6 +8,7 @@ from urllib.parse import quote
 
 import numpy as np
 
+from mcap_landmarks import memory
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.locations import Location, to_read
@@ -118,6 +119,8 @@ def _read(path: Location, database: sqlite3.Connection) -> LandmarkMap:
 
 
 def _map_of(database: sqlite3.Connection) -> LandmarkMap:
+    if problem := memory.excess_of_landmarks(database.execute("SELECT count(*) FROM landmark").fetchone()[0]):
+        raise MapError(problem)
     frame = database.execute("SELECT frame FROM map").fetchone()
     if frame is None:
         raise ValueError("its table map is empty")

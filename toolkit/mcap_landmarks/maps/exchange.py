@@ -3,6 +3,7 @@
 import json
 from enum import StrEnum
 
+from mcap_landmarks import memory
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.errors import MapError, UsageError
 from mcap_landmarks.locations import Location, to_read
@@ -41,6 +42,8 @@ def import_map(path: Location, form: Format) -> LandmarkMap:
         MapError: it cannot be read, or is not of that format; says where and what was expected.
     """
     text = read_text(path)
+    if problem := memory.excess_of_landmarks(max(text.count("\n"), text.count('"id"'))):
+        raise MapError(f"{path}: {problem}")
     if form is Format.THESIS:
         return exchange_thesis.parse_map(text, str(path))
     if form is Format.CSV:
