@@ -42,12 +42,16 @@ ChunkSize = Annotated[
     str | None, typer.Option("--chunk-size", metavar="SIZE", help="Write all chunks anew, of about 256K, 4M, ...")
 ]
 Compression = Annotated[
-    str | None, typer.Option("--compression", metavar="zstd|lz4|none", help="Write all chunks anew, so compressed.")
+    str | None,
+    typer.Option(
+        "--compression", metavar="zstd|lz4|none", help="Write all chunks anew, so compressed; bags: lz4, bz2."
+    ),
 ]
 
-To = Annotated[str, typer.Option("--to", metavar="mcap|rosbag2", help="rosbag2 is a folder for `ros2 bag play`.")]
+To = Annotated[str, typer.Option("--to", metavar="mcap|rosbag2|bag", help="rosbag2 is a folder, bag of ROS 1.")]
 OutputName = Annotated[
-    str, typer.Option("-o", "--output", metavar="OUT", help="A file NAME.mcap, or a folder: for files, or a ROS 2 bag.")
+    str,
+    typer.Option("-o", "--output", metavar="OUT", help="A file NAME.mcap, or a folder; see --to."),
 ]
 """As text: a slash at its end says that it is a folder."""
 
@@ -136,14 +140,16 @@ class FormOptions:
         """
         from mcap_landmarks.recording.chunk_form import CHUNK_BYTES, ChunkForm
 
-        if self.compression not in {None, "zstd", "lz4", "none"}:
-            raise UsageError(f"--compression {self.compression}: choose zstd, lz4 or none")
+        known = ("lz4", "bz2", "none") if self.to == "bag" else ("zstd", "lz4", "none")
+        if self.compression not in {None, *known}:
+            raise UsageError(f"--compression {self.compression}: choose {', '.join(known[:-1])} or none")
         if self.chunk_size is None and self.compression is None:
             return None
         size = CHUNK_BYTES if self.chunk_size is None else size_bytes(self.chunk_size, "--chunk-size")
         if size > LARGEST_CHUNK_BYTES:
             raise UsageError(f"--chunk-size {self.chunk_size}: at most 64M; readers hold whole chunks in memory")
-        return ChunkForm(self.compression or "zstd", size, is_for_images=self.compression is not None)
+        default = "none" if self.to == "bag" else "zstd"
+        return ChunkForm(self.compression or default, size, is_for_images=self.compression is not None)
 
 
 _LONGEST_S = 2**63 / 1e9

@@ -121,6 +121,11 @@ class McapLog:
             for loss in recording.losses:
                 self._lose(loss)
 
+    def attachment_names(self) -> list[str]:
+        """The names of the file's attachments that can be read."""
+        with open_recording(self._file.path, known=self.index) as recording:
+            return [attachment.name for attachment in recording.attachments()]
+
     def check_attachments(self) -> None:
         """Read the file's attachments, to know of those that are damaged."""
         with open_recording(self._file.path, known=self.index) as recording:

@@ -32,6 +32,13 @@ _NAMES = {
 """The policies of rmw/types.h by their numbers, as rmw/qos_string_conversions.h names them."""
 _POLICY = re.compile(rf"\b({'|'.join(_NAMES)})(['\"]?: *)['\"]?(\w+)\b['\"]?")
 
+_LATCHED = re.compile(r"\bdurability:\s*(?:1|transient_local)\s*$", re.MULTILINE)
+
+
+def is_latched(text: str) -> bool:
+    """Whether profiles let those who subscribe later have the last messages."""
+    return _LATCHED.search(text) is not None
+
 
 def is_named(text: str) -> bool:
     """Whether profiles have their policies by name, as from Jazzy on, and not by number."""

@@ -1,19 +1,17 @@
 """Messages that hold until the next of their kind: where a log is cut, the latest before the cut come along."""
 
-import re
 from collections.abc import Iterable, Mapping
 
 from mcap_landmarks.channels import TF_STATIC
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.images import CameraInfo
-from mcap_landmarks.messages.qos import KEY
+from mcap_landmarks.messages.qos import KEY, is_latched
 from mcap_landmarks.messages.transforms import TFMessage
 from mcap_landmarks.stage import Connection, RawMessage
 
 _LOG_TYPES = frozenset({"rcl_interfaces/msg/Log", "rosgraph_msgs/msg/Log"})
 _SERVICE_EVENTS = "/_service_event"
-_TRANSIENT_LOCAL = re.compile(r"\bdurability:\s*(?:1|transient_local)\s*$", re.MULTILINE)
 
 
 def latched(connections: Iterable[Connection]) -> list[Connection]:
@@ -35,8 +33,7 @@ def _is_latched(connection: Connection) -> bool:
     if connection.message_type in _LOG_TYPES or connection.topic.endswith(_SERVICE_EVENTS):
         return False
     is_static = connection.topic.endswith(TF_STATIC.topic) and connection.read_as == TFMessage.ROS_TYPE
-    latched = _TRANSIENT_LOCAL.search(connection.metadata.get(KEY, ""))
-    return is_static or latched is not None or connection.read_as == CameraInfo.ROS_TYPE
+    return is_static or is_latched(connection.metadata.get(KEY, "")) or connection.read_as == CameraInfo.ROS_TYPE
 
 
 def latest(raws: Iterable[RawMessage], start_ns: int) -> list[RawMessage]:

@@ -1,7 +1,7 @@
 """One output of a conversion, or its parts: what is written, and the account of all messages."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
@@ -101,19 +101,13 @@ class Job:
             kept = self.inputs.declare(writer, by_chunk=self._form is None)
             _put(writer, chain(carried, self.inputs.pieces(writer, kept, span, advance)))
             counts = {connection: writer.count(connection) for connection in self.inputs.connections}
-            done.topics.update(writer.counts)
-            done.declared = done.topics.total()
-            if done.declared == len(carried):
-                raise NoMessagesError(f"{self.inputs.where}: {self._why_nothing()}")
+            self.tally(done, counts, carried)
             writer.metadata[RUN] = self._manifest().entries()
             if carried:
-                on_topics = Counter(raw.connection.topic for raw in carried)
-                done.notes.append(carried_note(on_topics))
-                writer.metadata[RUN][CARRIED] = entry_text(on_topics)
+                writer.metadata[RUN][CARRIED] = entry_text(Counter(raw.connection.topic for raw in carried))
             self._carry_over(writer, done, counts)
             self._files.append(BagFile(target.name, done.topics.total(), *writer.times_ns()))
             self._written.update(counts)
-            self._read.update(counts)
             if not is_first:  # an earlier part has them, too
                 self._read.subtract(raw.connection for raw in carried)
             if is_last:
@@ -121,6 +115,21 @@ class Job:
             if lost := done.told_losses():
                 writer.metadata[REPORT] = loss_report(done.declared, done.topics.total(), lost)
         return done
+
+    def tally(self, done: Converted, counts: Mapping[Connection, int], carried: Sequence[RawMessage]) -> None:
+        """Count what was written to an output, `carried` messages among it.
+
+        Raises:
+            NoMessagesError: there is nothing else.
+        """
+        for connection, count in counts.items():
+            done.topics[connection.topic] += count
+        done.declared = done.topics.total()
+        if done.declared == len(carried):
+            raise NoMessagesError(f"{self.inputs.where}: {self._why_nothing()}")
+        if carried:
+            done.notes.append(carried_note(Counter(raw.connection.topic for raw in carried)))
+        self._read.update(counts)
 
     def holding(self, start_ns: int | None) -> list[RawMessage]:
         """What holds at a start; a part of a bag is not read alone, so that only the first one needs it."""
@@ -148,6 +157,10 @@ class Job:
         times = [time for file in self._files for time in (file.start_ns, file.end_ns) if time is not None]
         bag = bag_of(self._told, self._written, (min(times), max(times)) if times else ())
         return replace(bag, files=tuple(self._files))
+
+    def pass_over(self, counts: Mapping[Connection, int]) -> None:
+        """Count messages as read that an output cannot take, and who writes it tells of."""
+        self._read.update(counts)
 
     def account(self, done: Converted) -> None:
         """Compare what was read for all outputs with what the storage declares, and say it with this one."""

@@ -145,6 +145,11 @@ class ConversionInputs:
             else:
                 yield piece._replace(connection=own)
 
+    def messages(self, span: tuple[int | None, int | None], advance: Progress) -> Iterator[RawMessage]:
+        """The messages of all parts by time, on the connections of the output."""
+        for raw in self._messages(self._unified, *span, advance):
+            yield raw._replace(connection=self._unified[raw.connection])
+
     def before(self, start_ns: int) -> list[RawMessage]:
         """What holds at a start because of messages before it."""
         holding = set(latched(self._unified.values()))
@@ -175,11 +180,15 @@ class ConversionInputs:
         return sorted(blocks, key=lambda block: block.start_ns)
 
     def _messages(
-        self, connections: Collection[Connection], start_ns: int | None, end_ns: int | None
+        self,
+        connections: Collection[Connection],
+        start_ns: int | None,
+        end_ns: int | None,
+        advance: Progress | None = None,
     ) -> Iterator[RawMessage]:
         """The messages of some connections, of all parts by time."""
         pieces: list[Piece[RawMessage]] = [
-            (part.start_ns, partial(part.messages, set(connections), start_ns, end_ns, None))
+            (part.start_ns, partial(part.messages, set(connections), start_ns, end_ns, advance))
             for part in self.parts
             if part.start_ns is not None
         ]

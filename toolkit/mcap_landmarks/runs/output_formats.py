@@ -5,20 +5,22 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from mcap_landmarks.errors import UsageError
+from mcap_landmarks.errors import MessageError, UsageError
 from mcap_landmarks.inspection.open_logs import OpenLog
 from mcap_landmarks.recording.chunk_form import ChunkForm
 from mcap_landmarks.recording.writer import ROS2, profile_of
 from mcap_landmarks.runs.outputs import make_folder, output_files
 from mcap_landmarks.runs.splitting import Split
+from mcap_landmarks.sources import ros1_type
 from mcap_landmarks.stage import Connection
 
 
 class OutputFormat(StrEnum):
-    """What outputs are: recordings, or bags of ROS 2, which are folders."""
+    """What outputs are: recordings, bags of ROS 2, which are folders, or those of ROS 1."""
 
     MCAP = "mcap"
     ROSBAG2 = "rosbag2"
+    BAG = "bag"
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,14 +36,21 @@ class OutputForm:
     names_folder: bool = False
 
 
-_SUFFIXES = {OutputFormat.MCAP: ".mcap"}
+_SUFFIXES = {OutputFormat.MCAP: ".mcap", OutputFormat.BAG: ".bag"}
 _FILES = {".mcap", ".bag", ".db3"}
 
 
 def refusal(to: OutputFormat, connection: Connection) -> str:
     """Why a format cannot hold the messages of a connection, empty if it can."""
-    if to is OutputFormat.ROSBAG2 and profile_of([connection]) != ROS2:
-        return f"its messages are {connection.message_encoding or 'of no known encoding'}, and ROS 2 plays CDR only"
+    if to is OutputFormat.MCAP:
+        return ""
+    if profile_of([connection]) != ROS2:
+        return f"its messages are {connection.message_encoding or 'of no known encoding'}, and bags hold those of ROS"
+    if to is OutputFormat.BAG:
+        try:
+            ros1_type(connection.message_type, connection.schema, connection.schema_encoding)
+        except MessageError as error:
+            return str(error)
     return ""
 
 
@@ -51,6 +60,8 @@ def planned(logs: Sequence[OpenLog], output: Path, form: OutputForm) -> dict[Pat
     Raises:
         UsageError: the name is that of another format, or does not fit the logs.
     """
+    if form.split and form.to is OutputFormat.BAG:
+        raise UsageError("--to bag writes each log as one file; split it with --to rosbag2, or as MCAP")
     several, own = len(logs) > len({log.path for log in logs}), _SUFFIXES.get(form.to, "")
     if output.suffix.lower() in _FILES and not (form.names_folder or output.is_dir()):
         _check_file(output, form, len(logs) if several else 1)
@@ -78,8 +89,10 @@ def _check_file(output: Path, form: OutputForm, logs: int) -> None:
 def _remedy(output: Path, to: OutputFormat) -> str:
     if to is OutputFormat.ROSBAG2:
         return f"a ROS 2 bag is a folder; name it {output.stem}"
-    bag = f"-o {output.stem} --to rosbag2"
-    return f"convert writes MCAP; name the output {output.stem}.mcap, or make a ROS 2 bag with {bag}"
+    if to is OutputFormat.BAG:
+        return f"--to bag writes ROS 1 bags; name the output {output.stem}.bag"
+    other = "--to bag" if output.suffix == ".bag" else f"-o {output.stem} --to rosbag2"
+    return f"convert writes MCAP; name the output {output.stem}.mcap, or make a bag with {other}"
 
 
 def _in_folder(names: Collection[str], logs: Sequence[OpenLog], output: Path) -> dict[Path, list[OpenLog]]:

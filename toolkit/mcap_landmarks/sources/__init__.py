@@ -9,6 +9,7 @@ from mcap_landmarks.sources._bag_metadata import recorded_metadata
 from mcap_landmarks.sources._definition_files import definition_files
 from mcap_landmarks.sources._foxglove_types import counterpart
 from mcap_landmarks.sources._merge import Piece, merge
+from mcap_landmarks.sources._ros1_back import Ros1Type, ros1_type
 from mcap_landmarks.sources._shape import (
     BagDescription,
     Carried,
@@ -62,6 +63,7 @@ __all__ = [
     "OmittedTopic",
     "Payload",
     "Piece",
+    "Ros1Type",
     "Source",
     "SourceLog",
     "counterpart",
@@ -70,6 +72,7 @@ __all__ = [
     "find_source",
     "merge",
     "recorded_metadata",
+    "ros1_type",
     "settled",
     "source_names",
     "source_of",

@@ -103,13 +103,22 @@ def _types_in(file: Path, content: bytes) -> _Types:
     name, text = _type_of(file), decoded(content)
     try:
         if file.suffix == ".idl":
-            types = get_types_from_idl(_DIRECTIVE.sub("", text))
-            return {message_name(one): (made[0], _plainly(made[1])) for one, made in types.items()}
+            return idl_types(text)
         if file.suffix == ".msg":
             return dict(get_types_from_msg(plain(text), name))
         return service_types(name, text) if file.suffix == ".srv" else _action_types(name, text)
     except (TypesysError, ValueError, KeyError, AssertionError, RecursionError) as error:
         raise MessageError(f"{file} cannot be understood: {str(error).splitlines()[0]}") from error
+
+
+def idl_types(text: str) -> _Types:
+    """What an IDL text defines.
+
+    Raises:
+        TypesysError: it cannot be understood.
+    """
+    types = get_types_from_idl(_DIRECTIVE.sub("", text))
+    return {message_name(one): (made[0], _plainly(made[1])) for one, made in types.items()}
 
 
 def service_types(name: str, text: str) -> _Types:

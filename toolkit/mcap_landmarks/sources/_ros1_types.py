@@ -73,9 +73,9 @@ def converted(ros_type: str, text: str, md5sum: str = "", files: DefinitionFiles
     humble = typestore().fielddefs
     own = target_name not in humble or target.fielddefs[target_name][1] != humble[target_name][1]
     schema = target.generate_msgdef(target_name, ros_version=2)[0] if own else definition(target_name)
-    if _same_bytes(source.fielddefs, source_name, target.fielddefs, target_name):
+    if same_bytes(source.fielddefs, source_name, target.fielddefs, target_name):
         return ConvertedType(target_name, schema, _guarded(_copying(target, target_name), ros_type), is_sure)
-    migrate = _migration(source.fielddefs, source_name, target, target_name)
+    migrate = migration(source.fielddefs, source_name, target, target_name)
 
     def rewrite(data: Payload) -> Payload:
         return target.serialize_cdr(migrate(source.deserialize_ros1(data, source_name)), target_name)
@@ -89,7 +89,7 @@ def _source(name: str, text: str, md5sum: str, files: DefinitionFiles) -> tuple[
     Raises:
         MessageError: it lacks what nobody defines, or is empty and was another one than that which is known.
     """
-    standard = _standard().fielddefs
+    standard = standard_ros1().fielddefs
 
     def known(one: str) -> MessageFields | None:
         return files.fields(one) or standard.get(one)
@@ -106,7 +106,8 @@ def _source(name: str, text: str, md5sum: str, files: DefinitionFiles) -> tuple[
 
 
 @cache
-def _standard() -> Typestore:
+def standard_ros1() -> Typestore:
+    """ROS 1's own types."""
     return get_typestore(Stores.ROS1_NOETIC)
 
 
@@ -140,7 +141,7 @@ def _target(source: Types, source_name: str) -> tuple[str, Typestore]:
 
     def take(name: str) -> str:
         new = _RENAMED.get(name, name)
-        if new in humble and _fits(source, name, humble, new):
+        if new in humble and fits(source, name, humble, new):
             _copy(humble, new, needed)
         elif name not in needed:
             needed[name] = source[name]
@@ -169,7 +170,7 @@ def _renamed(kind: FieldType, take: Callable[[str], str]) -> FieldType:
     return (kind[0], take(kind[1])) if kind[0] == Nodetype.NAME else kind
 
 
-def _fits(source: Types, source_name: str, target: Types, target_name: str) -> bool:
+def fits(source: Types, source_name: str, target: Types, target_name: str) -> bool:
     """Whether every field of the source type finds its place in the target type."""
     places = {name.lower(): kind for name, kind in target[target_name][1]}
     return all(
@@ -186,21 +187,21 @@ def _kind_fits(source: Types, kind: FieldType, target: Types, place: FieldType) 
         return bool(kind[1][1] == place[1][1]) and _kind_fits(source, kind[1][0], target, place[1][0])
     if kind[0] == Nodetype.NAME:
         same = bool(_RENAMED.get(kind[1], kind[1]) == place[1])
-        return same and _fits(source, kind[1], target, place[1])
+        return same and fits(source, kind[1], target, place[1])
     return bool(kind[1] == place[1]) or {kind[1][0], place[1][0]} <= _ONE_BYTE
 
 
-def _same_bytes(source: Types, source_name: str, target: Types, target_name: str) -> bool:
+def same_bytes(source: Types, source_name: str, target: Types, target_name: str) -> bool:
     """Whether the fields follow each other equally, the header's `seq` apart, which CDR leaves out."""
     have = [(name, kind) for name, kind in source[source_name][1] if (source_name, name) != (_HEADER, "seq")]
     want = [(name, kind) for name, kind in target[target_name][1] if name != FILLER]
     if [name.lower() for name, _ in have] != [name.lower() for name, _ in want]:
         return False
     pairs = [(nested_in(kind), nested_in(place)) for (_, kind), (_, place) in zip(have, want, strict=True)]
-    return all(_same_bytes(source, a, target, b) for a, b in pairs if a and b)
+    return all(same_bytes(source, a, target, b) for a, b in pairs if a and b)
 
 
-def _migration(source: Types, source_name: str, target: Typestore, target_name: str) -> Callable[[object], object]:
+def migration(source: Types, source_name: str, target: Typestore, target_name: str) -> Callable[[object], object]:
     """What makes an object of the target type from one of the source type."""
     names = {name.lower(): (name, kind) for name, kind in source[source_name][1]}
     steps: list[Callable[[object], object]] = []
@@ -220,7 +221,7 @@ def _field_migration(
     nested, wanted = nested_in(kind), nested_in(place)
     if nested is None or wanted is None:
         return lambda message: getattr(message, name)
-    migrate = _migration(source, nested, target, wanted)
+    migrate = migration(source, nested, target, wanted)
     if kind[0] == Nodetype.NAME:
         return lambda message: migrate(getattr(message, name))
     return lambda message: [migrate(item) for item in getattr(message, name)]
