@@ -113,11 +113,11 @@ def test_an_output_is_what_its_name_says(tmp_path: Path, capsys: pytest.CaptureF
     capsys.readouterr()
     (tmp_path / "file").touch()
     for name, options, words in (
-        ("x.bag", (), "convert writes MCAP; name the output x.mcap, or make a ROS 2 bag with -o x --to rosbag2"),
-        ("x.db3", (), "convert writes MCAP; name the output x.mcap, or make a ROS 2 bag with -o x --to rosbag2"),
+        ("x.bag", (), "convert writes MCAP; name the output x.mcap, or make a bag with --to bag"),
+        ("x.db3", (), "convert writes MCAP; name the output x.mcap, or make a bag with -o x --to rosbag2"),
         ("x.db3", ("--to", "rosbag2"), "a ROS 2 bag is a folder; name it x"),
         ("x.mcap", ("--to", "rosbag2"), "a ROS 2 bag is a folder; name it x"),
-        ("x", ("--to", "db3"), "--to db3: choose mcap or rosbag2"),
+        ("x", ("--to", "db3"), "--to db3: choose mcap, rosbag2 or bag"),
         ("file", (), "is a file and no folder; give the output another name, as NAME.mcap"),
     ):
         assert call("convert", source, "-o", tmp_path / name, *options) == USAGE

@@ -106,7 +106,7 @@ class FormOptions:
         from mcap_landmarks.runs.output_formats import OutputForm, OutputFormat
 
         if self.to not in set(OutputFormat):
-            raise UsageError(f"--to {self.to}: choose {' or '.join(OutputFormat)}")
+            raise UsageError(f"--to {self.to}: choose mcap, rosbag2 or bag")
         return OutputForm(self.split(), self.form(), OutputFormat(self.to), names_folder=names_folder)
 
     def split(self) -> "Split | None":

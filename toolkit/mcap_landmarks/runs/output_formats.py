@@ -60,8 +60,7 @@ def planned(logs: Sequence[OpenLog], output: Path, form: OutputForm) -> dict[Pat
     Raises:
         UsageError: the name is that of another format, or does not fit the logs.
     """
-    if form.split and form.to is OutputFormat.BAG:
-        raise UsageError("--to bag writes each log as one file; split it with --to rosbag2, or as MCAP")
+    _check_split(form)
     several, own = len(logs) > len({log.path for log in logs}), _SUFFIXES.get(form.to, "")
     if output.suffix.lower() in _FILES and not (form.names_folder or output.is_dir()):
         _check_file(output, form, len(logs) if several else 1)
@@ -73,6 +72,11 @@ def planned(logs: Sequence[OpenLog], output: Path, form: OutputForm) -> dict[Pat
     if form.to is OutputFormat.ROSBAG2 and not several:
         return {output: list(logs)}
     return _in_folder([f"{log.name}{own}" for log in logs], logs, output)
+
+
+def _check_split(form: OutputForm) -> None:
+    if form.split and form.to is OutputFormat.BAG:
+        raise UsageError("--to bag writes each log as one file; split it with --to rosbag2, or as MCAP")
 
 
 def _check_file(output: Path, form: OutputForm, logs: int) -> None:
