@@ -15,7 +15,7 @@ from mcap.records import Channel, Footer, Header, Schema
 from mcap_landmarks.messages.typestore import definition
 
 MAGIC = b"\x89MCAP0\r\n"
-HUGE = 1 << 30
+HUGE = 1 << 29
 """So many bytes are claimed, or really come, wherever nothing smaller does."""
 
 
@@ -78,13 +78,13 @@ def lz4_chunk(folder: Path) -> Path:
 
 def tiny_records(folder: Path) -> Path:
     """A chunk of millions of records without content."""
-    content = struct.pack("<BQ", 0x7F, 0) * 500_000
+    content = struct.pack("<BQ", 0x7F, 0) * 250_000
     return _mcap(folder / "tiny.mcap", _chunk(len(content), b"zstd", zstandard.ZstdCompressor(3).compress(content)))
 
 
 def tiny_messages(folder: Path) -> Path:
     """A chunk of millions of messages without content."""
-    content = (struct.pack("<BQ", 5, 22) + struct.pack("<HIQQ", 1, 0, 1, 1)) * 150_000
+    content = (struct.pack("<BQ", 5, 22) + struct.pack("<HIQQ", 1, 0, 1, 1)) * 100_000
     return _mcap(folder / "messages.mcap", _chunk(len(content), b"zstd", zstandard.ZstdCompressor(3).compress(content)))
 
 
@@ -141,7 +141,7 @@ def lz4_bag(folder: Path) -> Path:
 
 def tiny_bag(folder: Path) -> Path:
     """A bag's chunk of millions of messages without content."""
-    content = _bag_record(b"", op=b"\2", conn=bytes(4), time=bytes(8)) * 100_000
+    content = _bag_record(b"", op=b"\2", conn=bytes(4), time=bytes(8)) * 40_000
     data = lz4.frame.compress(content)
     chunk = _bag_record(data, op=b"\5", compression=b"lz4", size=struct.pack("<I", len(content)))
     return _bag(folder / "tiny.bag", chunk)
@@ -154,8 +154,8 @@ def growing_bag(folder: Path) -> Path:
     return _bag(folder / "growing.bag", chunk, "odd/T0", growing_text())
 
 
-def db3_message(folder: Path) -> Path:
-    """A db3 with messages that unpack to a gigabyte each."""
+def db3_message(folder: Path, size: int = HUGE) -> Path:
+    """A db3 with messages that unpack to so many bytes each."""
     path = folder / "message.db3"
     with sqlite3.connect(path) as database:
         database.executescript(
@@ -168,7 +168,7 @@ def db3_message(folder: Path) -> Path:
         database.execute("INSERT INTO topics VALUES (1, '/talk', 'std_msgs/msg/String', 'cdr', '')")
         text = definition("std_msgs/msg/String")
         database.execute("INSERT INTO message_definitions VALUES (1, 'std_msgs/msg/String', 'ros2msg', ?, '')", (text,))
-        rows = [(zeros(HUGE),), (zeros_of_unknown_size(HUGE),)]
+        rows = [(zeros(size),), (zeros_of_unknown_size(size),)]
         database.executemany("INSERT INTO messages(topic_id, timestamp, data) VALUES (1, 5, ?)", rows)
     database.close()
     return path
@@ -192,7 +192,7 @@ def many_aliases(folder: Path) -> Path:
     lines += [f"  a{i}: &a{i} [*a{i - 1}, *a{i - 1}]" for i in range(1, 40)]
     lines += ["  ros_distro: *a39", "  relative_file_paths: [*a39]"]
     (bag / "metadata.yaml").write_text("\n".join(lines))
-    db3_message(bag)
+    db3_message(bag, 1 << 20)
     return bag
 
 
