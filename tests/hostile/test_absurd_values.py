@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from mcap.writer import Writer
+from mcap_landmarks.messages.typestore import definition
 
 from tests.cli.calls import call
 from tests.hostile import inputs
@@ -79,6 +80,7 @@ LOGS = {
     "map of a chunk's indexes": _altered(damages.CHUNK_INDEX, 32, NONE[:4]),
     "entries of a message index": _altered(damages.MESSAGE_INDEX, 2, NONE[:4]),
     "place in a message index": _altered(damages.MESSAGE_INDEX, 14, NONE),
+    "keys of a metadata record": _altered(damages.METADATA, 9, NONE[:3]),
     "times near 2**64": _stamped(0, 2**63, 2**64 - 1),
     "a negative time": _db3(-5),
     "a time that is a word": _db3("soon"),
@@ -100,6 +102,22 @@ def test_absurd_values_end_no_verb_without_words(name: str, tmp_path: Path) -> N
     assert call("convert", log, "-o", folder / "out.mcap") in {0, 1, 3}
     assert call("recover", log, "-o", folder / "back.mcap") in {0, 1, 3}
     assert [path.name for path in tmp_path.rglob("escaped*")] == []
+
+
+@pytest.mark.parametrize("topic", ["/scan", "/odom"])
+def test_sensors_may_tell_times_that_cannot_be(topic: str, tmp_path: Path) -> None:
+    """Of log times near 2**64 the stamps of sensors are looked at like those of others."""
+    ros_type = {"/scan": "sensor_msgs/msg/LaserScan", "/odom": "nav_msgs/msg/Odometry"}[topic]
+    with (tmp_path / "log.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2", "by hand")
+        schema = writer.register_schema(ros_type, "ros2msg", definition(ros_type).encode())
+        channel = writer.register_channel(topic, "cdr", schema)
+        for stamp in (1, 2**63, 2**64 - 1):
+            data = bags.HUMBLE.serialize_cdr(bags.scan(bags.HUMBLE, 10**9), ros_type) if topic == "/scan" else b""
+            writer.add_message(channel, stamp, bytes(data) or b"\0\1\0\0" + bytes(716), stamp)
+        writer.finish()
+    assert call("info", "--check", tmp_path / "log.mcap") in {0, 3}
 
 
 def test_a_type_that_holds_itself_is_compared(tmp_path: Path) -> None:

@@ -2,6 +2,9 @@
 
 from datetime import UTC, datetime
 
+LATEST_NS = 2**63 - 1
+"""MCAP has unsigned log times; what is later than signed ones can be (year 2262) is damage and counts as this."""
+
 
 def moment(time_ns: int) -> str:
     """RFC 3339 to the nanosecond, as --start and --end take it; a number where the calendar ends."""

@@ -24,6 +24,7 @@ from mcap_landmarks.inspection.odometry_examination import ExaminedOdometry, Odo
 from mcap_landmarks.inspection.topic_roles import message_type
 from mcap_landmarks.messages.codec import Message, decode
 from mcap_landmarks.messages.header import frame_in, stamp_in
+from mcap_landmarks.moments import LATEST_NS
 from mcap_landmarks.mounting import BASES, Edge, base_in
 from mcap_landmarks.recording.clocks import Clock, Times, clock_of, shifts_of
 from mcap_landmarks.recording.odometry_track import odometry_from
@@ -122,7 +123,7 @@ class Examiner:
         if raw.connection not in odometry:
             log_ns, stamp_ns = self._times[raw.connection]
             stamp_ns.append(stamp_in(raw.data))
-            log_ns.append(raw.log_time_ns)
+            log_ns.append(min(raw.log_time_ns, LATEST_NS))
             self._named[raw.connection][plain(frame_in(raw.data))] += 1
             return
         message = odometry_from(decode(message_type(ODOMETRY, raw.connection), raw.data))

@@ -17,6 +17,7 @@ from mcap_landmarks.geometry.se2 import Array, between, compose, inverse
 from mcap_landmarks.inspection.log_frames import is_robot
 from mcap_landmarks.inspection.odometry_use import ALWAYS, CHOOSE, Use, added_up, usable_messages
 from mcap_landmarks.messages.poses import Odometry
+from mcap_landmarks.moments import LATEST_NS
 from mcap_landmarks.recording.clocks import Clock, Times
 from mcap_landmarks.recording.odometry_track import OdometryTrack
 
@@ -55,7 +56,7 @@ class OdometryMessages:
 
     def take(self, log_time_ns: int, message: Odometry) -> None:
         """One more message, by log time."""
-        self.log_ns.append(log_time_ns)
+        self.log_ns.append(min(log_time_ns, LATEST_NS))
         self.stamp_ns.append(message.stamp_ns)
         self.frames.append((plain(message.frame_id), plain(message.child_frame_id)))
         for values in (

@@ -26,6 +26,7 @@ from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.moments import LATEST_NS
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.odometry_track import odometry_from
 from mcap_landmarks.sources import merge
@@ -167,7 +168,7 @@ def _transforms(raw: RawMessage, found: Survey, seen: Counter[Connection]) -> No
 def _take(raw: RawMessage, sensor: Sensor, found: Survey, stride: int) -> None:
     ros_type, number = raw.connection.message_type, len(sensor.log_ns)
     stamp_ns = _first_stamp_ns(raw.data) if ros_type == TFMessage.ROS_TYPE else stamp_in(raw.data)
-    sensor.log_ns.append(raw.log_time_ns)
+    sensor.log_ns.append(min(raw.log_time_ns, LATEST_NS))
     sensor.stamp_ns.append(stamp_ns)
     if ros_type in _SCANS and number % stride == 0:
         scan = found.readings.setdefault(sensor.topic, ScanReadings()).read(decode(_SCANS[ros_type], raw.data))

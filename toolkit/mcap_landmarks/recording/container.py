@@ -2,9 +2,11 @@
 
 from io import SEEK_END, BytesIO
 from struct import Struct
+from struct import error as struct_error
 from typing import BinaryIO, TypeVar
 
 from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import McapRecord
 
@@ -33,8 +35,15 @@ def read_up_to(stream: BinaryIO, size: int) -> bytes:
 
 
 def parse(record: type[R], content: bytes | memoryview) -> R:
-    """Record of a class of mcap.records from its content, the bytes after opcode and length."""
-    found: R = record.read(ReadDataStream(BytesIO(content)))  # type: ignore[attr-defined] # every record class has it
+    """Record of a class of mcap.records from its content, the bytes after opcode and length.
+
+    Raises:
+        McapError, ValueError: the content is none such.
+    """
+    try:
+        found: R = record.read(ReadDataStream(BytesIO(content)))  # type: ignore[attr-defined] # every record class has it
+    except struct_error as error:  # a field of fixed length is cut
+        raise EndOfFile from error
     return found
 
 

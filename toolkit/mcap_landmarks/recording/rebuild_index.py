@@ -1,5 +1,6 @@
 """Index a recording by reading it once from the front, in bounded memory: for want of a summary that can be trusted."""
 
+import contextlib
 from collections.abc import Callable
 from typing import BinaryIO
 
@@ -171,7 +172,8 @@ class _Scanner:
         return crc
 
     def _statistics(self, offset: int, length: int) -> None:
-        self._found.statistics = parse(records.Statistics, self._content(offset, length))
+        with contextlib.suppress(McapError, ValueError):  # nothing but a count to compare with is lost
+            self._found.statistics = parse(records.Statistics, self._content(offset, length))
 
     def _data_end(self, offset: int, length: int) -> None:
         self._found.data_end = offset
