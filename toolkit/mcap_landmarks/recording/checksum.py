@@ -1,7 +1,13 @@
 """The CRC-32 of chunks and files."""
 
+from collections.abc import Callable
+
+_combine: Callable[[int, int, int], int] | None = None
 try:
     from zlib_ng.zlib_ng import crc32 as _crc32
+    from zlib_ng.zlib_ng import crc32_combine
+
+    _combine = crc32_combine
 except ModuleNotFoundError:  # there is no wheel for the machine
     from zlib import crc32 as _crc32
 
@@ -13,3 +19,11 @@ def crc32(data: bytes | bytearray | memoryview, before: int = 0) -> int:
     images would spend two thirds of its time; where zlib-ng is missing, zlib's gives the same.
     """
     return int(_crc32(data, before))
+
+
+def crc32_after(data: bytes | bytearray | memoryview, own: int, before: int) -> int:
+    """The CRC-32 of bytes with the CRC `own` that follow others with the CRC `before`.
+
+    The bytes are not read again, unless zlib-ng is missing, which knows how to join two CRCs.
+    """
+    return int(_crc32(data, before) if _combine is None else _combine(before, own, len(data)))

@@ -5,36 +5,29 @@ from dataclasses import dataclass
 from struct import error as struct_error
 from typing import BinaryIO
 
-import numpy as np
 from mcap import records
 from mcap.exceptions import McapError
-from numpy.typing import NDArray
 
 from mcap_landmarks.recording.blocks import DamagedBlockError, chunk_content, records_in
-from mcap_landmarks.recording.container import CHUNK, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, parse, read_up_to
+from mcap_landmarks.recording.container import CHUNK, RECORD, Opcode, parse, read_up_to
 from mcap_landmarks.recording.declared_channels import Declared
+from mcap_landmarks.recording.message_index import INDEX_HEAD, count_of, indexed
 from mcap_landmarks.recording.summary_index import Block
-
-_MESSAGE = np.dtype(
-    [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")]
-)
-_ENTRY = np.dtype([("log", "<u8"), ("offset", "<u8")])
-_INDEX_HEAD = RECORD.size + 6
-"""Bytes of a message index before its entries: opcode, length, channel id, and how many bytes the entries have."""
-
-_COMPRESSED = 0x28
-"""First byte of payloads that rosbag2 compressed one by one with zstd (RFC 8878), and does not mark in MCAP."""
 
 
 @dataclass(frozen=True, slots=True)
 class WholeChunk:
-    """The whole record of a chunk, and of its message indexes by channel. `log_time_ns` is its first message's."""
+    """The whole record of a chunk, and of its message indexes by channel. `log_time_ns` is its first message's.
+
+    `checked_crc` is that of its data, where these are not compressed and were held against it.
+    """
 
     log_time_ns: int
     end_ns: int
     record: bytes
     indexes: Mapping[int, bytes]
     counts: Mapping[int, int]
+    checked_crc: int | None = None
 
 
 def compressed(record: bytes) -> tuple[str, memoryview]:
@@ -57,31 +50,32 @@ def read_whole(
     stream.seek(block.offset)
     record = read_up_to(stream, block.length)
     try:
-        chunk = _whole(record, {key: index for key, index in _read_indexes(stream).items() if len(index) > _INDEX_HEAD})
-        content = chunk_content(memoryview(record)[RECORD.size :], verify=verify)
-        is_same = (chunk.log_time_ns, chunk.end_ns) == (block.start_ns, block.end_ns) and chunk.counts.keys() <= ids
-        return chunk if is_same and _agrees(content, _entries(chunk.indexes), declared) else None
+        indexes = {channel_id: index for channel_id, index in _read_indexes(stream).items() if count_of(index)}
+        chunk = _whole(record, indexes, declared, verify=verify)
     except (DamagedBlockError, McapError, EOFError, ValueError, struct_error):
         return None
+    is_same = (chunk.log_time_ns, chunk.end_ns) == (block.start_ns, block.end_ns) and indexes.keys() <= ids
+    return chunk if is_same else None
 
 
-def _whole(record: bytes, indexes: Mapping[int, bytes]) -> WholeChunk:
-    """A chunk with its message indexes, which agree about its times.
+def _whole(record: bytes, indexes: Mapping[int, bytes], declared: Declared, *, verify: bool) -> WholeChunk:
+    """A chunk with its message indexes, which name all in it but for what is declared.
 
     Raises:
         DamagedBlockError: they do not, or it is no chunk.
     """
     if record[:1] != bytes([Opcode.CHUNK]):
         raise DamagedBlockError("there is no chunk where the summary says")
-    start_ns, end_ns, _, _ = CHUNK.unpack_from(record, RECORD.size)
-    times = [each["log"] for each in _entries(indexes).values()]
-    if not times or (min(map(np.min, times)), max(map(np.max, times))) != (start_ns, end_ns):
-        raise DamagedBlockError("its times are not those of its message index")
-    return WholeChunk(start_ns, end_ns, record, indexes, {key: len(t) for key, t in zip(indexes, times, strict=True)})
-
-
-def _entries(indexes: Mapping[int, bytes]) -> dict[int, NDArray[np.void]]:
-    return {key: np.frombuffer(index, _ENTRY, offset=_INDEX_HEAD) for key, index in indexes.items()}
+    start_ns, end_ns, _, crc = CHUNK.unpack_from(record, RECORD.size)
+    content = chunk_content(memoryview(record)[RECORD.size :], verify=verify)
+    found = indexed(content, indexes)
+    if found is None or (found.start_ns, found.end_ns) != (start_ns, end_ns):
+        raise DamagedBlockError("its message index does not name what is in it")
+    if not all(_is_declared(content[start:end], declared) for start, end in found.gaps):
+        raise DamagedBlockError("what it declares is something else now")
+    is_checked = verify and crc != 0 and not compressed(record)[0]
+    counts = {channel_id: count_of(index) for channel_id, index in indexes.items()}
+    return WholeChunk(start_ns, end_ns, record, indexes, counts, crc if is_checked else None)
 
 
 def _read_indexes(stream: BinaryIO) -> dict[int, bytes]:
@@ -94,36 +88,10 @@ def _read_indexes(stream: BinaryIO) -> dict[int, bytes]:
             return indexes
         index = head + read_up_to(stream, length)
         channel_id = int.from_bytes(index[RECORD.size : RECORD.size + 2], "little")
-        entries = int.from_bytes(index[_INDEX_HEAD - 4 : _INDEX_HEAD], "little")
-        if channel_id in indexes or len(index) != RECORD.size + length or len(index) != _INDEX_HEAD + entries:
+        entries = int.from_bytes(index[INDEX_HEAD - 4 : INDEX_HEAD], "little")
+        if channel_id in indexes or len(index) != RECORD.size + length or len(index) != INDEX_HEAD + entries:
             raise DamagedBlockError("its message index is damaged")
         indexes[channel_id] = index
-
-
-def _agrees(content: memoryview, entries: Mapping[int, NDArray[np.void]], declared: Declared) -> bool:
-    """Whether the message indexes name each message of a chunk, and all that lies between these is declared."""
-    index = np.concatenate(list(entries.values()))
-    channels = np.repeat(np.array(list(entries), np.uint16), [len(each) for each in entries.values()])
-    order = np.argsort(index["offset"], kind="stable")
-    index, channels = index[order], channels[order]
-    if int(index["offset"][-1]) + MESSAGE.size > len(content):
-        return False
-    starts = index["offset"].astype(np.int64)
-    at_each_byte = np.ndarray((len(content) - MESSAGE.size + 1,), _MESSAGE, content, strides=(1,))
-    found = at_each_byte[starts]
-    is_message = (found["opcode"] == Opcode.MESSAGE) & (found["length"] >= MESSAGE_FIXED)
-    is_indexed = (found["channel"] == channels) & (found["log"] == index["log"])
-    if not (is_message & is_indexed & (found["length"] <= len(content))).all():
-        return False
-    payloads = starts[found["length"] > MESSAGE_FIXED] + MESSAGE.size
-    if (np.frombuffer(content, np.uint8)[np.minimum(payloads, len(content) - 1)] == _COMPRESSED).any():
-        return False
-    ends = np.append(0, starts + RECORD.size + found["length"].astype(np.int64))
-    nexts = np.append(starts, len(content))
-    gaps = np.flatnonzero(ends != nexts)
-    return bool((ends <= nexts).all()) and all(
-        _is_declared(content[start:end], declared) for start, end in zip(ends[gaps], nexts[gaps], strict=True)
-    )
 
 
 def _is_declared(stretch: memoryview, declared: Declared) -> bool:

@@ -20,7 +20,7 @@ from mcap_landmarks.messages.images import CompressedImage, Image
 from mcap_landmarks.messages.qos import KEY, qos_profile
 from mcap_landmarks.messages.typestore import definition
 from mcap_landmarks.messages.video import CompressedVideo, TheoraPacket
-from mcap_landmarks.recording.checksum import crc32
+from mcap_landmarks.recording.checksum import crc32, crc32_after
 from mcap_landmarks.recording.chunk_copy import WholeChunk, compressed
 from mcap_landmarks.recording.chunk_form import CHUNK_NS, ChunkForm, OpenChunk
 from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, serialize
@@ -229,7 +229,7 @@ class RecordingWriter:
         for channel_id, count in chunk.counts.items():
             self._message_counts[channel_id] += count
             self.counts[self._declared.channels[channel_id].topic] += count
-        self._put_chunk(chunk.record, chunk.indexes)
+        self._put_chunk(chunk.record, chunk.indexes, chunk.checked_crc)
 
     def count(self, connection: Connection) -> int:
         """How many messages of a connection that is declared are written."""
@@ -250,7 +250,8 @@ class RecordingWriter:
     def _flush(self, chunk: OpenChunk) -> None:
         content = self._compress(chunk.data) if chunk.compressed else chunk.data
         compression = self._form.compression.encode() if chunk.compressed else b""
-        head = CHUNK.pack(chunk.start_ns, chunk.end_ns, len(chunk.data), crc32(chunk.data))
+        crc = crc32(chunk.data)
+        head = CHUNK.pack(chunk.start_ns, chunk.end_ns, len(chunk.data), crc)
         head += _LENGTH.pack(len(compression)) + compression + _LENGTH_8.pack(len(content))
         record = b"".join((RECORD.pack(Opcode.CHUNK, len(head) + len(content)), head, content))
         indexes = {}
@@ -259,15 +260,15 @@ class RecordingWriter:
                 entries.byteswap()
             content = entries.tobytes()
             indexes[channel_id] = _INDEX.pack(_MESSAGE_INDEX, 6 + len(content), channel_id, len(content)) + content
-        self._put_chunk(record, indexes)
+        self._put_chunk(record, indexes, None if compression else crc)
 
-    def _put_chunk(self, record: bytes, indexes: Mapping[int, bytes]) -> None:
-        """Write the whole record of a chunk and those of its message indexes, by channel."""
+    def _put_chunk(self, record: bytes, indexes: Mapping[int, bytes], data_crc: int | None) -> None:
+        """Write the whole record of a chunk, whose data have a CRC if that is known, and its message indexes."""
         start_ns, end_ns, size, _ = CHUNK.unpack_from(record, RECORD.size)
         compression, data = compressed(record)
         start, offsets = self._offset, {}
         self._content.update(record[RECORD.size : RECORD.size + CHUNK.size])
-        self._put(record)
+        self._put(record, len(data), data_crc)
         for channel_id, index in indexes.items():
             offsets[channel_id] = self._offset
             self._put(index)
@@ -285,7 +286,13 @@ class RecordingWriter:
             )
         )
 
-    def _put(self, data: bytes) -> None:
+    def _put(self, data: bytes, tail: int = 0, tail_crc: int | None = None) -> None:
+        """Write some bytes, the last `tail` of which have a CRC that may be known."""
         self._stream.write(data)
         self._offset += len(data)
-        self._crc = crc32(data, self._crc)
+        if tail_crc is None:
+            self._crc = crc32(data, self._crc)
+        else:
+            view = memoryview(data)
+            head = len(data) - tail
+            self._crc = crc32_after(view[head:], tail_crc, crc32(view[:head], self._crc))
