@@ -3,6 +3,7 @@
 import hashlib
 import json
 import re
+from collections import Counter
 from collections.abc import Mapping
 
 from mcap_landmarks.diff.document import ManifestRow, StructureRow
@@ -118,12 +119,14 @@ def _message_counts(recording: Recording) -> dict[str, int]:
 
 
 def _other_metadata(recording: Recording) -> dict[str, object]:
-    return {
-        f"{name}.{key}": value
-        for name, entries in recording.metadata.items()
-        if name != RUN
-        for key, value in entries.items()
-    }
+    found: dict[str, object] = {}
+    names: Counter[str] = Counter()
+    for name, entries in recording.metadata_records:
+        names[name] += 1
+        number = f" ({names[name]})" if names[name] > 1 else ""
+        if name != RUN:
+            found |= {f"{name}{number}.{key}": value for key, value in entries.items()}
+    return found
 
 
 def _attachments(recording: Recording) -> dict[str, object]:

@@ -38,6 +38,7 @@ class McapLog:
         with open_recording(file.path) as recording:
             self.index = recording.index
             self.profile, self.metadata = recording.profile, recording.metadata
+            self.metadata_records = recording.metadata_records
             self.start_ns, self.end_ns = recording.start_ns, recording.end_ns
             self.losses = [f"{file.path.name}: {loss}" for loss in recording.losses]
             self.notes = [f"{file.path.name}: {note}" for note in recording.notes]

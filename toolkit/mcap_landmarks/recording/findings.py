@@ -135,7 +135,7 @@ class Findings:
             suspect_chunks=tuple(suspects),
             resyncs=tuple(self.stretches),
             cut=self._cut(),
-            records=tuple(dict.fromkeys([*self.lost_records, *self.index.replaced])),
+            records=tuple(dict.fromkeys(self.lost_records)),
             unverified=0 if self.crc_matches else self.unverified,
             loose=0 if self.crc_matches else self.loose,
             duplicates=tuple(self.duplicates),

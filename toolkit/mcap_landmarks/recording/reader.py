@@ -72,16 +72,17 @@ def open_recording(
 class Recording:
     """An open recording; made by `open_recording`.
 
-    `channels` lists every channel with its count, `start_ns` and `end_ns` are the first and last log time, `metadata`
-    holds the entries of every metadata record by name. `damage` is the account of what could not be read, so far, and
-    `index` where everything lies.
+    `channels` lists every channel with its count, `start_ns` and `end_ns` are the first and last log time.
+    `metadata_records` come in the order of the file, `metadata` holds the entries of the last of each name. `damage`
+    is the account of what could not be read, so far, and `index` where everything lies.
     """
 
     def __init__(self, path: Location, stream: BinaryIO, index: Index, *, verify: bool) -> None:
         self.path = path
         self.profile, self.library = index.header.profile, index.header.library
         self.start_ns, self.end_ns = index.start_ns, index.end_ns
-        self.metadata = index.metadata
+        self.metadata_records = tuple(index.metadata_records)
+        self.metadata = dict(self.metadata_records)
         self.index, self.damage = index, index.damage
         self._stream, self._verify = stream, verify
         self._lost_attachments: list[str] = []

@@ -154,7 +154,7 @@ class _Scanner:
         except (McapError, ValueError):
             self._found.lost_records.append(f"the metadata record at byte {offset} is damaged; it is left out")
         else:
-            self.index.take_metadata(record)
+            self.index.metadata_records.append((record.name, record.metadata))
             self._found.metadata_count += 1
 
     def _attachment(self, offset: int, length: int) -> None:

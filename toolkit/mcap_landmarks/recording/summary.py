@@ -18,6 +18,19 @@ _OPCODES = {
 }
 
 
+def attachment_index(attachment: records.Attachment, offset: int, length: int) -> records.AttachmentIndex:
+    """The index of an attachment whose record has its place and length."""
+    return records.AttachmentIndex(
+        offset=offset,
+        length=length,
+        log_time=attachment.log_time,
+        create_time=attachment.create_time,
+        data_size=len(attachment.data),
+        name=attachment.name,
+        media_type=attachment.media_type,
+    )
+
+
 def summary_section(groups: Sequence[Sequence[records.McapRecord]], offset: int) -> bytes:
     """Everything from the end of the data section on, which lies at `offset`; empty groups are left out."""
     out = BytesIO()

@@ -1,7 +1,7 @@
 """What a recording holds and where: taken from its summary, where that can be trusted."""
 
 import contextlib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from struct import Struct
 from struct import error as struct_error
@@ -42,6 +42,10 @@ class Block:
         return replace(self, channel_ids=frozenset(channel_ids) or None, start_ns=start_ns, end_ns=end_ns)
 
 
+MetadataRecord = tuple[str, Mapping[str, str]]
+"""Name and entries; several records of a recording may have one name."""
+
+
 @dataclass(slots=True)
 class Index:
     """Contents of a recording. `counts` are messages by channel id; `damage` says what of it cannot be read."""
@@ -51,23 +55,12 @@ class Index:
     channels: dict[int, records.Channel] = field(default_factory=dict)
     counts: dict[int, int] = field(default_factory=dict)
     blocks: list[Block] = field(default_factory=list)
-    metadata: dict[str, dict[str, str]] = field(default_factory=dict)
+    metadata_records: list[MetadataRecord] = field(default_factory=list)
     metadata_places: list[int] = field(default_factory=list)
     attachments: list[int] = field(default_factory=list)
     start_ns: int | None = None
     end_ns: int | None = None
     damage: Damage = field(default_factory=Damage)
-    replaced: list[str] = field(default_factory=list)
-
-    def take_metadata(self, record: records.Metadata) -> None:
-        """A metadata record; of several with one name the last counts, and `replaced` says which were others.
-
-        rosbag2 writes its own when it opens a file, and again when it closes it.
-        """
-        earlier = self.metadata.get(record.name, record.metadata)
-        if earlier != record.metadata and record.name != "rosbag2":
-            self.replaced.append(f"of the metadata records named {record.name} only the last is kept")
-        self.metadata[record.name] = record.metadata
 
     def connection(self, channel_id: int) -> Connection:
         """A channel with its schema."""
@@ -137,7 +130,6 @@ def index_from_summary(stream: BinaryIO, size: int, header: records.Header, data
         return "its summary is damaged; read from the front"
     total = sum(index.counts.values())
     index.damage = Damage(expected=total, recovered=total, unverified=unverified, is_whole=True)
-    index.damage = replace(index.damage, records=tuple(dict.fromkeys(index.replaced)))
     return index
 
 
@@ -175,7 +167,7 @@ def _each(section: bytes) -> Iterator[tuple[int, bytes]]:
 def _collect(
     stream: BinaryIO, header: records.Header, section: bytes
 ) -> tuple[Index, list[records.ChunkIndex], records.Statistics | None]:
-    index, chunks, statistics = Index(header), [], None
+    index, chunks, statistics, named = Index(header), [], None, dict[int, MetadataRecord]()
     for opcode, content in _each(section):
         if opcode == Opcode.SCHEMA:
             schema = parse(records.Schema, content)
@@ -190,10 +182,11 @@ def _collect(
         elif opcode == Opcode.METADATA_INDEX:
             where = parse(records.MetadataIndex, content)
             record = parse(records.Metadata, read_record(stream, where.offset)[1])
-            index.take_metadata(record)
+            named[where.offset] = (record.name, record.metadata)
             index.metadata_places.append(where.offset)
         elif opcode == Opcode.ATTACHMENT_INDEX:
             index.attachments.append(parse(records.AttachmentIndex, content).offset)
+    index.metadata_records = [named[place] for place in sorted(named)]
     chunks.sort(key=lambda chunk: chunk.chunk_start_offset)
     index.blocks = [_block(chunk) for chunk in chunks]
     return index, chunks, statistics
@@ -234,7 +227,7 @@ def _has_all(index: Index, statistics: records.Statistics) -> bool:
         statistics.metadata_count,
     )
     schemas = {channel.schema_id for channel in index.channels.values()} - {0}  # 0 stands for none
-    there = (len(index.channels), len(index.blocks), len(index.attachments), len(index.metadata_places))
+    there = (len(index.channels), len(index.blocks), len(index.attachments), len(index.metadata_records))
     return counted == there and schemas <= set(index.schemas)
 
 

@@ -4,6 +4,7 @@ import contextlib
 import hashlib
 import sys
 from collections.abc import Iterable, Iterator, Mapping
+from operator import itemgetter
 from struct import Struct
 from typing import BinaryIO
 
@@ -25,7 +26,8 @@ from mcap_landmarks.recording.chunk_copy import WholeChunk, compressed
 from mcap_landmarks.recording.chunk_form import CHUNK_NS, ChunkForm, OpenChunk
 from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, serialize
 from mcap_landmarks.recording.declared_channels import Declared
-from mcap_landmarks.recording.summary import summary_section
+from mcap_landmarks.recording.summary import attachment_index, summary_section
+from mcap_landmarks.recording.summary_index import MetadataRecord
 from mcap_landmarks.stage import Channel, Connection, RawMessage, Stamped
 
 ROS2 = "ros2"
@@ -56,18 +58,20 @@ def create_recording(
     profile: str = ROS2,
     is_passing: bool = False,
     form: ChunkForm | None = None,
+    carried: Iterable[MetadataRecord] = (),
 ) -> Iterator["RecordingWriter"]:
     """A writer whose file takes the name `path` when the block ends well and vanishes when it does not.
 
     `profile` is that of the channels, see `profile_of`. One that `is_passing`, which is read once and removed, is
-    compressed in a quarter of the time, and less; `form` is how its chunks look otherwise.
+    compressed in a quarter of the time, and less; `form` is how its chunks look otherwise. `carried` are metadata
+    records of other recordings; those that have a name of `metadata` are left out.
 
     Raises:
         UsageError, RecordingError: the file cannot be written; nothing is left behind.
     """
     with atomic_file(path) as stream:
         form = form or ChunkForm("lz4" if is_passing else "zstd", is_for_images=False)
-        writer = RecordingWriter(stream, form, profile=profile)
+        writer = RecordingWriter(stream, form, profile=profile, carried=carried)
         for name, entries in (metadata or {}).items():
             writer.metadata[name] = dict(entries)
         yield writer
@@ -83,9 +87,12 @@ class RecordingWriter:
     fingerprint is bound to the content.
     """
 
-    def __init__(self, stream: BinaryIO, form: ChunkForm, *, profile: str = ROS2) -> None:
+    def __init__(
+        self, stream: BinaryIO, form: ChunkForm, *, profile: str = ROS2, carried: Iterable[MetadataRecord] = ()
+    ) -> None:
         self.metadata: dict[str, dict[str, str]] = {}
         self.counts: dict[str, int] = {}
+        self._carried = tuple(carried)
         self._stream = stream
         self._offset = self._crc = 0
         self._connections: dict[Connection, tuple[int, str]] = {}
@@ -171,17 +178,7 @@ class RecordingWriter:
     def attach(self, attachment: records.Attachment) -> None:
         """Carry an attachment over from another recording."""
         data = serialize(attachment)
-        self._attachments.append(
-            records.AttachmentIndex(
-                offset=self._offset,
-                length=len(data),
-                log_time=attachment.log_time,
-                create_time=attachment.create_time,
-                data_size=len(attachment.data),
-                name=attachment.name,
-                media_type=attachment.media_type,
-            )
-        )
+        self._attachments.append(attachment_index(attachment, self._offset, len(data)))
         self._put(data)
 
     def finish(self) -> None:
@@ -191,7 +188,8 @@ class RecordingWriter:
         if "fingerprint" in self.metadata.get(RUN, {}):
             self.metadata[RUN][CONTENT] = entry_text(self._content.hexdigest())
         metadata_indexes = []
-        for name, entries in sorted(self.metadata.items()):
+        carried = [record for record in self._carried if record[0] not in self.metadata]
+        for name, entries in sorted([*carried, *self.metadata.items()], key=itemgetter(0)):
             data = serialize(records.Metadata(name=name, metadata=dict(sorted(entries.items()))))
             metadata_indexes.append(records.MetadataIndex(length=len(data), name=name, offset=self._offset))
             self._put(data)
@@ -293,6 +291,5 @@ class RecordingWriter:
         if tail_crc is None:
             self._crc = crc32(data, self._crc)
         else:
-            view = memoryview(data)
-            head = len(data) - tail
-            self._crc = crc32_after(view[head:], tail_crc, crc32(view[:head], self._crc))
+            head, end = memoryview(data)[: len(data) - tail], memoryview(data)[len(data) - tail :]
+            self._crc = crc32_after(end, tail_crc, crc32(head, self._crc))

@@ -15,6 +15,7 @@ from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.chunk_copy import WholeChunk
 from mcap_landmarks.recording.chunk_form import ChunkForm
 from mcap_landmarks.recording.latched import carried_note
+from mcap_landmarks.recording.summary_index import MetadataRecord
 from mcap_landmarks.recording.writer import ROS2, RecordingWriter, create_recording, profile_of
 from mcap_landmarks.runs.bag_record import Told, bag_of, bag_record, custom_data_of
 from mcap_landmarks.runs.conversion_inputs import ConversionInputs
@@ -97,7 +98,8 @@ class Job:
         profile = profile_of(self.inputs.connections)
         if profile != ROS2:
             done.notes.append(_told_others(self.inputs.connections))
-        with create_recording(target, self._carried(), profile=profile, form=self._form) as writer:
+        records = self._metadata_records()
+        with create_recording(target, profile=profile, form=self._form, carried=records) as writer:
             kept = self.inputs.declare(writer, by_chunk=self._form is None)
             _put(writer, chain(carried, self.inputs.pieces(writer, kept, span, advance)))
             counts = {connection: writer.count(connection) for connection in self.inputs.connections}
@@ -190,12 +192,13 @@ class Job:
         dropped = [f"{reason} ({count})" for log in self.inputs.logs for reason, count in log.dropped.items()]
         return "; ".join(dropped) or "there are no messages in it; choose another log, or other --topics"
 
-    def _carried(self) -> Mapping[str, Mapping[str, str]]:
-        """The inputs' metadata records, where these stay true."""
-        carried: dict[str, Mapping[str, str]] = {}
+    def _metadata_records(self) -> list[MetadataRecord]:
+        """The inputs' metadata records, where these stay true; those that several inputs have come once."""
+        carried: list[MetadataRecord] = []
         for part in self.inputs.parts:
             if isinstance(part, McapLog):
-                carried.update({name: entries for name, entries in part.metadata.items() if name not in _LOST_WITH})
+                known = list(carried)
+                carried += [one for one in part.metadata_records if one[0] not in _LOST_WITH and one not in known]
         return carried
 
     def _manifest(self) -> Manifest:

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
+from operator import itemgetter
 from pathlib import Path
 
 from mcap_landmarks.manifest import (
@@ -24,6 +25,7 @@ from mcap_landmarks.recording.chunk_copy import WholeChunk
 from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.layered_log import Layer, LayeredLog, own_layer
 from mcap_landmarks.recording.reader import Recording
+from mcap_landmarks.recording.summary_index import MetadataRecord
 from mcap_landmarks.recording.writer import RecordingWriter, create_recording, profile_of
 from mcap_landmarks.runs.bag_record import bag_of
 from mcap_landmarks.runs.rosbag2_metadata import RECORD, record_of
@@ -59,18 +61,18 @@ def write_output(
         stages=records,
         generated=is_generated(source.metadata),
     )
-    metadata = {**source.metadata, RUN: manifest.entries()}
+    entries = manifest.entries()
     own = _own(session, results)
     earlier = session.earlier
-    if not request.force and earlier is not None and _is_there(earlier, metadata, own, results, source):
+    if not request.force and earlier is not None and _is_there(earlier, entries, own, results, source):
         losses, carried = [*source.losses, *told_losses(earlier.metadata)], told_carried(earlier.metadata)
     else:
-        losses, carried = _write(session, output, metadata, [own, *results], watch)
+        losses, carried = _write(session, output, entries, [own, *results], watch)
     return [*notes, *([carried_note(carried)] if carried else [])], losses
 
 
 def _write(
-    session: Session, output: Path, metadata: Mapping[str, Mapping[str, str]], layers: Sequence[Layer], watch: Watch
+    session: Session, output: Path, entries: Mapping[str, str], layers: Sequence[Layer], watch: Watch
 ) -> tuple[list[str], dict[str, int]]:
     """Write the output; what of the log is unreadable, and what was carried over from before its start, by topic."""
     span, source, view = session.request.span, session.log.recording, LayeredLog(session.log.path, layers)
@@ -78,7 +80,11 @@ def _write(
     counts = dict(Counter(raw.connection.topic for raw in carried))
     size = view.size_bytes(None, span.start_ns, span.end_ns)
     profile = profile_of(entry.connection for entry in view.channels)
-    with create_recording(output, metadata, profile=profile) as writer, watch(f"write {output.name}", size) as progress:
+    records = source.metadata_records
+    with (
+        create_recording(output, {RUN: entries}, profile=profile, carried=records) as writer,
+        watch(f"write {output.name}", size) as progress,
+    ):
         clean, kept = _declare(writer, layers[0])
         pieces = view.pieces(kept, writer.declared(), span.start_ns, span.end_ns, progress)
         for piece in chain(carried, pieces):
@@ -97,7 +103,7 @@ def _write(
 
 def _renew(writer: RecordingWriter, source: Recording) -> None:
     """Have what rosbag2 keeps of a bag as a whole, if the log has that, say what is in the output."""
-    if RECORD in writer.metadata:
+    if RECORD in source.metadata:
         told, counts = recorded_metadata(source.metadata), {one: writer.count(one) for one in writer.declared().ids}
         writer.metadata[RECORD] = record_of(bag_of([("", told)], counts, writer.times_ns()))
 
@@ -134,26 +140,27 @@ def _declare(writer: RecordingWriter, own: Layer) -> tuple[dict[Connection, Conn
 
 def _is_there(
     earlier: Recording,
-    metadata: dict[str, dict[str, str]],
+    entries: Mapping[str, str],
     own: Layer,
     results: Sequence[Layer],
     source: Recording,
 ) -> bool:
     """Whether an earlier output holds all that would be written."""
+    own_entries = {k: v for k, v in earlier.metadata.get(RUN, {}).items() if k not in {CONTENT, LOSSES, CARRIED}}
     return (
         earlier.is_ours
-        and _lasting(earlier.metadata) == _lasting(metadata)
-        and recorded_metadata(earlier.metadata).custom_data == recorded_metadata(metadata).custom_data
+        and own_entries == entries
+        and _others(earlier) == sorted(_others(source), key=itemgetter(0))
+        and recorded_metadata(earlier.metadata).custom_data == recorded_metadata(source.metadata).custom_data
         and all(layer.recording is earlier for layer in results)
         and _topics(own_layer(earlier)) == _topics(own)
         and (not own.channels or list(earlier.attachments()) == list(source.attachments()))
     )
 
 
-def _lasting(metadata: Mapping[str, Mapping[str, str]]) -> dict[str, Mapping[str, str]]:
-    """The records but for what depends on the content."""
-    entries = {k: v for k, v in metadata.get(RUN, {}).items() if k not in {CONTENT, LOSSES, CARRIED}}
-    return {**{name: record for name, record in metadata.items() if name != RECORD}, RUN: entries}
+def _others(recording: Recording) -> list[MetadataRecord]:
+    """The metadata records but for those that depend on the content."""
+    return [record for record in recording.metadata_records if record[0] not in {RUN, RECORD}]
 
 
 def _topics(layer: Layer) -> list[tuple[str, str]]:

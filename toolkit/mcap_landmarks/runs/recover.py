@@ -76,11 +76,10 @@ def _recover_mcap(path: Path, target: Path, watch: Watch, *, overwrite: bool) ->
         watch(f"write {target.name}", recording.size_bytes()) as advance,
     ):
         manifest = Manifest("recover", inputs=(hash_,), generated=is_generated(recording.metadata))
-        kept = dict(recording.metadata)
-        if recording.losses:
-            kept.pop(_ROSBAG2, None)
-        metadata = {**kept, RUN: manifest.entries()}
-        with create_recording(target, metadata, profile=recording.profile) as writer:
+        untrue = {_ROSBAG2} if recording.losses else set()
+        carried = [record for record in recording.metadata_records if record[0] not in untrue]
+        metadata = {RUN: manifest.entries()}
+        with create_recording(target, metadata, profile=recording.profile, carried=carried) as writer:
             _copy(recording, writer, advance)
             attachments = 0
             for attachment in recording.attachments():
@@ -91,7 +90,7 @@ def _recover_mcap(path: Path, target: Path, watch: Watch, *, overwrite: bool) ->
             if not topics.total():
                 raise RecordingError(f"{path}: {_why_nothing(losses)}")
             damage = dataclasses.replace(recording.damage, recovered=topics.total())
-            done = Recovered(target, topics, damage, attachments, len(recording.metadata), losses, notes)
+            done = Recovered(target, topics, damage, attachments, len(recording.metadata_records), losses, notes)
             writer.metadata[REPORT] = loss_report(damage.expected, damage.recovered, losses, report(done))
     return done
 
