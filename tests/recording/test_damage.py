@@ -115,6 +115,17 @@ def test_chunks_without_a_crc_are_named_as_unverified_and_no_loss(tmp_path: Path
     assert account.notes == ["18 chunks without a CRC: nothing verifies their messages"]
 
 
+@pytest.mark.parametrize("crcs", [True, False])
+def test_a_cut_chunk_is_not_said_to_have_no_crc(tmp_path: Path, *, crcs: bool) -> None:
+    data = write("", crcs=crcs)[0]
+    first = of_kind(data, CHUNK)[0]
+    (tmp_path / "a.mcap").write_bytes(data[: first.end - 10])
+    _, account, _ = _read(tmp_path / "a.mcap")
+    told = [note for note in account.notes if "CRC" in note]
+    cannot = "the CRC of the chunk that the end of the file cuts cannot be checked"
+    assert told == ([cannot] if crcs else ["1 chunk without a CRC: nothing verifies its messages"])
+
+
 def test_a_sound_log_of_ours_is_the_same_recording_however_it_is_read(tmp_path: Path) -> None:
     write_log(tmp_path / "a.mcap", 3)
     with open_recording(tmp_path / "a.mcap") as recording:

@@ -29,8 +29,9 @@ class Damage:
 
     `expected` messages are those that the file itself tells of, None where nothing does; `recovered` those that can be
     had. `cut` says where the file is cut, `records` which other records are lost, `remarks` what is odd and costs
-    nothing. `unverified` are chunks without a CRC, `loose` runs of messages outside chunks, which have none,
-    `duplicates` the places of chunks that were there before. `is_whole`: the statistics prove that everything arrived.
+    nothing. `unverified` are chunks that no CRC proves, `is_cut_unverified` whether one of them has a CRC, which cannot
+    be checked since the end of the file cuts it, `loose` runs of messages outside chunks, which have none, `duplicates`
+    the places of chunks that were there before. `is_whole`: the statistics prove that everything arrived.
     """
 
     expected: int | None = None
@@ -40,6 +41,7 @@ class Damage:
     cut: str = ""
     records: tuple[str, ...] = ()
     unverified: int = 0
+    is_cut_unverified: bool = False
     loose: int = 0
     duplicates: tuple[int, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -67,8 +69,11 @@ class Damage:
         found = list(self.remarks)
         if self.is_whole:
             found += [f"{_passed_over(stretch)}; no message is lost by that" for stretch in self.resyncs]
-        if self.unverified:
-            found.append(f"{counted(self.unverified, 'chunk')} without a CRC: nothing verifies their messages")
+        if without := self.unverified - self.is_cut_unverified:
+            their = "its" if without == 1 else "their"
+            found.append(f"{counted(without, 'chunk')} without a CRC: nothing verifies {their} messages")
+        if self.is_cut_unverified:
+            found.append("the CRC of the chunk that the end of the file cuts cannot be checked")
         if self.loose:
             found.append("messages outside chunks have no CRC: nothing verifies them")
         if self.duplicates:

@@ -53,6 +53,8 @@ class Findings:
     unverified: int = 0
     loose: int = 0
     cut: int | None = None
+    cut_has_crc: bool = False
+    is_cut_unverified: bool = False
     data_end: int | None = None
     data_crc: int = 0
     crc_matches: bool | None = None
@@ -67,16 +69,18 @@ class Findings:
     def add(self, block: Block, *, is_verified: bool) -> None:
         """A block of messages."""
         self.index.blocks.append(block)
-        self.unverified += block.is_chunk and not is_verified and block.end_ns >= block.start_ns
+        if block.is_chunk and not is_verified and block.end_ns >= block.start_ns:
+            self.unverified += 1
+            self.is_cut_unverified |= block.is_cut and self.cut_has_crc
         self.loose += not block.is_chunk
 
     def suspect(self, offset: int, reason: str) -> None:
         """A chunk that is left out."""
         self.suspects.append(_Suspect(offset, reason))
 
-    def cut_at(self, offset: int) -> None:
-        """Where the record begins that the end of the file cuts."""
-        self.cut = offset
+    def cut_at(self, offset: int, *, has_crc: bool = False) -> None:
+        """Where the record begins that the end of the file cuts, and whether it has a CRC."""
+        self.cut, self.cut_has_crc = offset, has_crc
 
     def ends_with_magic(self, read: ReadAt) -> bool:
         """Whether the file ends as a finished one does."""
@@ -137,6 +141,7 @@ class Findings:
             cut=self._cut(),
             records=tuple(dict.fromkeys(self.lost_records)),
             unverified=0 if self.crc_matches else self.unverified,
+            is_cut_unverified=self.is_cut_unverified,
             loose=0 if self.crc_matches else self.loose,
             duplicates=tuple(self.duplicates),
             remarks=tuple(dict.fromkeys(([self.remark] if self.remark else []) + self.remarks)),

@@ -50,7 +50,7 @@ class ScannedChunks:
         is_rest_zero = all(not any(self._read(at, _PIECE)) for at in range(end, self._size, _PIECE))
         if len(record) - len(whole) < _FEWEST_ZEROS or not is_rest_zero:
             return False
-        self._found.cut_at(offset)
+        self._found.cut_at(offset, has_crc=_crc(record) != 0)
         try:
             content = cut_chunk_content(whole)
             self._fill(Block(offset, RECORD.size + len(whole), 0, 0, is_cut=True), content, is_verified=False)
@@ -104,7 +104,7 @@ class ScannedChunks:
             return None
         if begin + int.from_bytes(record[begin - 8 : begin], "little") != length or length > LARGEST_CHUNK:
             return None
-        self._found.cut_at(offset)
+        self._found.cut_at(offset, has_crc=_crc(record) != 0)
         try:
             content = cut_chunk_content(record)
             block = Block(offset, RECORD.size + len(record), 0, 0, is_cut=True)
