@@ -1,11 +1,13 @@
 """A small log with images, scans and odometry, and what counts how often the detector looks."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY, SCAN, TF_STATIC
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage
 from mcap_landmarks.messages.poses import Odometry
@@ -28,6 +30,23 @@ def raw_log(path: Path, count: int = COUNT) -> Path:
         for stamped in raw_messages(count):
             writer.add(stamped)
     return path
+
+
+def by_others(source: Path, target: Path, metadata: Sequence[tuple[str, dict[str, str]]] = ()) -> Path:
+    """A log as the mcap package writes it: all topics in the same chunks, with definitions and channels in these."""
+    with source.open("rb") as stream, target.open("wb") as out:
+        writer = Writer(out)
+        writer.start("ros2", "other")
+        ids: dict[str, int] = {}
+        for schema, channel, message in make_reader(stream).iter_messages():
+            if channel.topic not in ids and schema is not None:
+                schema_id = writer.register_schema(schema.name, schema.encoding, schema.data)
+                ids[channel.topic] = writer.register_channel(channel.topic, "cdr", schema_id, channel.metadata)
+            writer.add_message(ids[channel.topic], message.log_time, message.data, message.publish_time)
+        for name, entries in metadata:
+            writer.add_metadata(name, entries)
+        writer.finish()
+    return target
 
 
 def raw_messages(count: int = COUNT) -> list[Stamped]:

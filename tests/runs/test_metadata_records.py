@@ -4,7 +4,6 @@ from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
-from mcap.writer import Writer
 from mcap_landmarks.diff.declared import structure_rows
 from mcap_landmarks.progress import unwatched
 from mcap_landmarks.recording.reader import open_recording
@@ -14,7 +13,7 @@ from mcap_landmarks.runs.plan import Request
 from mcap_landmarks.runs.recover import recover
 from mcap_landmarks.runs.topic_selection import Selection
 
-from tests.runs.chain import raw_log
+from tests.runs.chain import by_others, raw_log
 from tests.runs.conversion import doctor, one
 
 NOTES = [("notes", {"weather": "rain"}), ("notes", {"weather": "sun"}), ("notes", {"weather": "rain"})]
@@ -25,21 +24,7 @@ OURS = ("mcap-landmarks.run", "mcap-landmarks.recover")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A short log by the mcap package, whose chunks hold several topics."""
     folder = tmp_path_factory.mktemp("records")
-    raw_log(folder / "ours.mcap", 4)
-    with (folder / "ours.mcap").open("rb") as source, (folder / "log.mcap").open("wb") as target:
-        writer = Writer(target)
-        writer.start("ros2", "other")
-        ids: dict[str, int] = {}
-        for schema, channel, message in make_reader(source).iter_messages():
-            if channel.topic not in ids:
-                assert schema is not None
-                schema_id = writer.register_schema(schema.name, schema.encoding, schema.data)
-                ids[channel.topic] = writer.register_channel(channel.topic, "cdr", schema_id, channel.metadata)
-            writer.add_message(ids[channel.topic], message.log_time, message.data, message.publish_time)
-        for name, entries in NOTES:
-            writer.add_metadata(name, entries)
-        writer.finish()
-    return folder / "log.mcap"
+    return by_others(raw_log(folder / "ours.mcap", 4), folder / "log.mcap", NOTES)
 
 
 def recorded(path: Path) -> list[tuple[str, dict[str, str]]]:
