@@ -72,6 +72,13 @@ def test_types_have_the_checksums_that_ros1_knows() -> None:
     assert transforms.md5sum == "94810edda583a504dfda3829e70d7eec"  # as rosmsg md5 gives it
 
 
+def test_events_of_services_arrive(tmp_path: Path, shared_data: Path) -> None:
+    """Their definition is that of the service, in rosbag2's own files."""
+    source = shared_data / "bags" / "topics_and_services.mcap"
+    assert call("convert", source, "-o", tmp_path / "a.bag", "--to", "bag") == DONE
+    assert len(messages(tmp_path / "a.bag")) == 13
+
+
 def test_every_type_of_a_bag_arrives(tmp_path: Path, shared_data: Path) -> None:
     source, out = shared_data / "bags" / "rosbags_rs_sqlite3", tmp_path / "a.bag"
     assert call("convert", source, "-o", out, "--to", "bag") in {DONE, PARTIAL}

@@ -63,8 +63,9 @@ class ConversionInputs:
             if not self.selection.wants(connection.topic, connection.message_type):
                 continue
             if reason := refusal(self.to, connection):
-                omitted = OmittedTopic(connection.topic, connection.message_type, entry.count, reason)
-                self.left_out = together([*self.left_out, omitted])
+                if entry.count:
+                    omitted = OmittedTopic(connection.topic, connection.message_type, entry.count, reason)
+                    self.left_out = together([*self.left_out, omitted])
                 continue
             renamed = self.selection.renamed(connection)
             unified[connection] = known.setdefault(_identity(renamed), renamed)
@@ -83,7 +84,7 @@ class ConversionInputs:
         stands = {one: first for ones in several.values() for one, first in _as_one(ones).items()}
         counts = {entry.connection: entry.count for part in self.parts for entry in part.channels}
         others = [one for one, own in unified.items() if own not in stands]
-        omitted = (OmittedTopic(one.topic, one.message_type, counts[one], _TWO_TYPES) for one in others)
+        omitted = (OmittedTopic(one.topic, one.message_type, counts[one], _TWO_TYPES) for one in others if counts[one])
         self.left_out = together([*self.left_out, *omitted])
         return {one: stands[own] for one, own in unified.items() if own in stands}
 

@@ -14,9 +14,10 @@ from rosbags.typesys.store import Typestore
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.messages.definition_extent import FieldType
 from mcap_landmarks.messages.typestore import typestore
-from mcap_landmarks.sources._definition_files import idl_types
-from mcap_landmarks.sources._definition_text import decoded, plain
+from mcap_landmarks.sources._definition_files import idl_types, service_event
+from mcap_landmarks.sources._definition_text import decoded, parts_of, plain
 from mcap_landmarks.sources._ros1_types import fits, migration, same_bytes, standard_ros1
+from mcap_landmarks.sources._ros2_types import fields_of_all
 from mcap_landmarks.sources._shape import Payload
 from mcap_landmarks.sources._type_graph import MessageFields, Types, filled, needed_by, nested_in
 
@@ -78,12 +79,15 @@ def _fields(name: str, schema: bytes, encoding: str) -> dict[str, MessageFields]
         MessageError: ROS 1 has no such field, or something is missing.
     """
     text = decoded(schema)
-    given = idl_types(text) if encoding == "ros2idl" else get_types_from_msg(plain(text), name)
+    if name.endswith("_Event") and len(parts_of(text)) == 2:  # as rosbag2 defines it: by the text of its service
+        given = dict(service_event(name, text))
+    else:
+        given = idl_types(text) if encoding == "ros2idl" else dict(get_types_from_msg(plain(text), name))
     types = {_plain_name(one): fields for one, fields in given.items()}
     known = typestore().fielddefs
 
     def find(one: str) -> MessageFields | None:
-        constants, fields = types.get(one) or known.get(one) or (None, None)
+        constants, fields = types.get(one) or known.get(one) or fields_of_all(one) or (None, None)
         if constants is None or fields is None:
             return None
         return constants, [(field, _unbounded(one, kind)) for field, kind in fields]
