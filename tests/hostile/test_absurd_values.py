@@ -60,6 +60,19 @@ def _db3(stamp: object) -> Callable[[Path], Path]:
     return make
 
 
+def _table(change: str) -> Callable[[Path], Path]:
+    """A db3 whose tables are other ones than they should be."""
+
+    def make(folder: Path) -> Path:
+        path = bags.write_plain_db3(folder / "log.db3", 3)
+        with sqlite3.connect(path) as database:
+            database.executescript(change)
+        database.close()
+        return path
+
+    return make
+
+
 def _bag(field: bytes, new: bytes) -> Callable[[Path], Path]:
     """A bag with other bytes wherever a field is."""
 
@@ -85,6 +98,17 @@ LOGS = {
     "a negative time": _db3(-5),
     "a time that is a word": _db3("soon"),
     "a time that is no time": _db3(1e300),
+    "topics without ids": _table("ALTER TABLE topics RENAME COLUMN id TO number"),
+    "topics without names": _table("ALTER TABLE topics RENAME COLUMN name TO title"),
+    "topics without types": _table("UPDATE topics SET type = NULL"),
+    "topics named by bytes": _table("UPDATE topics SET name = x'ff00'"),
+    "messages without times": _table("ALTER TABLE messages RENAME COLUMN timestamp TO moment"),
+    "messages of no topic": _table("UPDATE messages SET topic_id = 'x'"),
+    "payloads that are words": _table("UPDATE messages SET data = 'words'"),
+    "ids that are words": _table(
+        "DROP TABLE topics; CREATE TABLE topics(id, name, type, serialization_format,"
+        " offered_qos_profiles); INSERT INTO topics VALUES ('x', '/talk', 'std_msgs/msg/String', 'cdr', '')"
+    ),
     "seconds of 2**32": _bag(b"time=", NONE[:4]),
     "one chunk for all": _bag(b"chunk_pos=", struct.pack("<Q", 13)),
     "index in front": _bag(b"index_pos=", struct.pack("<Q", 13)),

@@ -21,6 +21,7 @@ from mcap_landmarks.sources._db3_topics import (
     definitions_in,
     distribution_in,
     rows_of,
+    texts_of,
     topic_of,
 )
 from mcap_landmarks.sources._definitions import Definitions
@@ -91,7 +92,7 @@ class Db3Log:
         try:
             with _database(path) as database:
                 self._read_topics(database, definitions)
-        except (sqlite3.DatabaseError, UnicodeDecodeError, KeyError, TypeError) as error:
+        except (sqlite3.DatabaseError, LookupError, TypeError, ValueError, OverflowError) as error:
             raise RecordingError(
                 f"{self._origin} is no ROS 2 bag, or too damaged to read: {error}; copy it again"
             ) from error
@@ -104,7 +105,8 @@ class Db3Log:
         self.about = (self._path.name, about_in(database, distribution))
         self._counts = self._count(database)
         self._topics: dict[int, Db3Topic] = {}
-        rows = {int(row["id"]): dict(row) for row in rows_of(database, "SELECT * FROM topics")}
+        found = {int(row["id"]): texts_of(row) for row in rows_of(database, "SELECT * FROM topics")}
+        rows = {key: row for key, row in found.items() if {"name", "type"} <= row.keys()}
         for key, row in rows.items():
             try:
                 self._topics[key] = topic_of(row, own, known)

@@ -13,6 +13,8 @@ from mcap_landmarks.sources._shape import BagDescription, Definition
 from mcap_landmarks.sources._verification import defined
 from mcap_landmarks.stage import Connection
 
+_LANGUAGES = {"ros2msg", "ros2idl"}
+
 
 @dataclass(frozen=True, slots=True)
 class Db3Topic:
@@ -27,6 +29,11 @@ def rows_of(database: sqlite3.Connection, query: str) -> list[sqlite3.Row]:
     return database.execute(query).fetchall()
 
 
+def texts_of(row: sqlite3.Row) -> dict[str, str]:
+    """The columns of a row that are texts: SQLite lets any column hold anything."""
+    return {key: value for key, value in dict(row).items() if isinstance(value, str)}
+
+
 def columns_of(database: sqlite3.Connection, table: str, column: str) -> set[str]:
     """The values of a column."""
     return {str(row[column]) for row in rows_of(database, f"SELECT {column} FROM {table}")}  # noqa: S608 - our own names
@@ -37,7 +44,7 @@ def definitions_in(database: sqlite3.Connection) -> dict[str, tuple[str, str]]:
     if "message_definitions" not in columns_of(database, "sqlite_master", "name"):
         return {}
     found = rows_of(database, "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions")
-    return {row[0]: (row[1], row[2]) for row in found if row[1] in {"ros2msg", "ros2idl"}}
+    return {row[0]: (row[1], row[2]) for row in found if row[1] in _LANGUAGES and len(texts_of(row)) == 3}
 
 
 def distribution_in(database: sqlite3.Connection) -> str | None:
@@ -67,8 +74,8 @@ def topic_of(row: dict[str, str], own: dict[str, tuple[str, str]], definitions: 
     metadata = {KEY: row.get("offered_qos_profiles") or ""}
     if digest := row.get("type_description_hash"):
         metadata["topic_type_hash"] = digest
-    if row["serialization_format"] != "cdr":
-        raise MessageError(f"its messages are {row['serialization_format']}, not CDR")
+    if (encoding := row.get("serialization_format")) != "cdr":
+        raise MessageError(f"its messages are {encoding}, not CDR")
     connection = Connection(name, message_type, b"", metadata=metadata)
     if message_type.endswith("_Event") and (text := _service_text(message_type, own)):
         event = definitions.service_event(message_type, text)
