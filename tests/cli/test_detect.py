@@ -198,7 +198,7 @@ def test_refusals(tmp_path: Path, model: Path, capsys: pytest.CaptureFixture[str
     for code, said, words in (
         (1, "no.onnx: cannot be read", (log, "--model", tmp_path / "no.onnx")),
         (1, "expected [1, ?, 5]", (log, "--model", other)),
-        (1, "no image (sensor_msgs/msg/CompressedImage or sensor_msgs/msg/Image)", (blind, "--model", model)),
+        (1, "there is no image (sensor_msgs/msg/CompressedImage", (blind, "--model", model)),
         (2, "did you mean confidence", (log, "--model", model, "--set", "detect.confidense=0.1")),
         (2, "detects no cat", (log, "--model", model, "--set", "detect.classes=['cat']")),
     ):

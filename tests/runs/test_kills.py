@@ -41,7 +41,7 @@ def files(folder: Path) -> dict[str, bytes]:
     [
         ("convert {0}/log.mcap -o {1}/out.mcap --exclude /odom", "", "open", 2),
         ("convert {0}/log.mcap -o {1}/out.mcap --overwrite", "out.mcap", "os.rename", 1),
-        ("convert {0}/log.mcap -o {1} --split-count 40 --overwrite", "log_1.mcap", "open", 4),
+        ("convert {0}/log.mcap -o {1} --split-count 40 --overwrite", "log_1.mcap", "open", 6),
         ("recover {0}/cut.mcap -o {1}/out.mcap", "", "os.rename", 1),
         ("localize {0}/log.mcap --map {0}/map.db -o {1}/out.mcap --overwrite", "out.mcap", "os.rename", 2),
         ("map {0}/log.mcap --map {1}/map.db", "", "os.rename", 1),

@@ -2,13 +2,12 @@
 
 import re
 from datetime import datetime
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.locations import Location, location
+from mcap_landmarks.locations import Location, location, to_read
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of text.")]
 Output = Annotated[
@@ -44,9 +43,10 @@ Distro = Annotated[
     typer.Option("--distro", help="ROS 2 distribution of bags without definitions, such as humble."),
 ]
 Definitions = Annotated[
-    list[Path] | None,
+    list[Location] | None,
     typer.Option(
         "--definitions",
+        parser=location,
         metavar="DIR|FILE",
         help=".msg, .srv, .action and .idl of types that bags do not define, as in a package's share/; repeatable.",
     ),
@@ -167,9 +167,11 @@ def time_ns(text: str | None, option: str) -> int | None:
     return int(whole.timestamp()) * 10**9 + (int(fraction[1].ljust(9, "0")[:9]) if fraction else 0)
 
 
-def add_definitions(settings: dict[str, dict[str, object]], distro: str | None, definitions: list[Path] | None) -> None:
+def add_definitions(
+    settings: dict[str, dict[str, object]], distro: str | None, definitions: list[Location] | None
+) -> None:
     """Add to the settings where definitions come from that bags lack."""
     if distro:
         settings.setdefault("rosbag2", {})["distro"] = distro
     for source in ("rosbag1", "rosbag2") if definitions else ():
-        settings.setdefault(source, {})["definitions"] = [str(path) for path in definitions or ()]
+        settings.setdefault(source, {})["definitions"] = [str(to_read(place)) for place in definitions or ()]
