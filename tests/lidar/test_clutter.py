@@ -1,7 +1,6 @@
 """Scans of nothing but noise: every cluster is near every other, and the work is bounded all the same."""
 
 import resource
-import time
 
 import numpy as np
 import pytest
@@ -11,12 +10,10 @@ from mcap_landmarks.lidar.config import ClusterConfig
 
 
 @pytest.mark.slow
-def test_a_scan_of_random_ranges_takes_seconds_and_no_gigabytes() -> None:
+def test_a_scan_of_random_ranges_takes_no_gigabytes() -> None:
     config = ClusterConfig()
     angles = np.linspace(-np.pi, np.pi, 1440, endpoint=False)
     beams = sweep(angles, np.random.default_rng(1).uniform(0.2, 12.0, 1440), np.eye(4))
     shapes, before = shapes_of(config), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    start = time.process_time()
     assert cluster(beams, shapes, config)
-    assert time.process_time() - start < 12  # 18 and 4 GB without bounds
     assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024 < 400
