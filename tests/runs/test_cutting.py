@@ -196,7 +196,7 @@ def test_what_a_ros_1_bag_latched_comes_along_unless_nothing_follows(tmp_path: P
     assert done.topics == {"/scan": 3, "/talk": 4}
     assert [raw.log_time_ns for raw in of_topic(tmp_path / "out.mcap", "/talk")][:2] == [at_ns[30], at_ns[30] + 1]
     assert of_topic(tmp_path / "out.mcap", "/talk")[0].publish_time_ns == at_ns[29] + 1
-    assert done.notes == ["the latest from before --start is carried over and logged at it: /talk"]
+    assert done.notes == ["the latest from before the start is carried over and logged at it: /talk"]
     assert done.dropped == {"messages outside the time range": 73}
     with pytest.raises(RecordingError, match="no message lies in the time range"):
         convert([source], tmp_path / "none.mcap", Selection((), at_ns[39] + 2), {}, unwatched)

@@ -63,4 +63,4 @@ def _parts(raw: RawMessage) -> Iterable[str]:
 def carried_note(counts: Mapping[str, int]) -> str:
     """What is told of messages that `latest` gave, of their number by topic."""
     topics = ", ".join(f"{topic} ({count})" if count > 1 else topic for topic, count in sorted(counts.items()))
-    return f"the latest from before --start is carried over and logged at it: {topics}"
+    return f"the latest from before the start is carried over and logged at it: {topics}"
