@@ -98,7 +98,7 @@ class McapLog:
 
     def _payloads(self, keys: Collection[int]) -> Iterator[tuple[int, Payload]]:
         """The messages of some channels; those that cannot be decompressed are told when they are read."""
-        with open_recording(self._file.path) as recording:
+        with open_recording(self._file.path, known=self.index) as recording:
             place = {entry.connection: i for i, entry in enumerate(recording.channels) if i in keys}
             for raw in recording.messages(list(place)):
                 carried = self._carried[place[raw.connection]]
@@ -113,27 +113,23 @@ class McapLog:
         progress: Progress | None = None,
     ) -> Iterator[RawMessage]:
         """See `Log`."""
-        with open_recording(self._file.path, known=self.index) as recording:
+        with self._opened() as recording:
             wanted = self._wanted(recording, connections)
             for raw in recording.messages(list(wanted), start_ns, end_ns, progress):
                 carried = self._convert(raw, wanted[raw.connection])
                 if carried is not None:
                     yield carried
-            for loss in recording.losses:
-                self._lose(loss)
 
     def attachment_names(self) -> list[str]:
         """The names of the file's attachments that can be read."""
-        with open_recording(self._file.path, known=self.index) as recording:
+        with self._opened() as recording:
             return [attachment.name for attachment in recording.attachments()]
 
     def check_attachments(self) -> None:
         """Read the file's attachments, to know of those that are damaged."""
-        with open_recording(self._file.path, known=self.index) as recording:
+        with self._opened() as recording:
             for _ in recording.attachments():
                 pass
-            for loss in recording.losses:
-                self._lose(loss)
 
     def pieces(
         self,
@@ -145,19 +141,17 @@ class McapLog:
         progress: Progress | None = None,
     ) -> Iterator[RawMessage | WholeChunk]:
         """See `Recording.pieces`."""
-        with open_recording(self._file.path, known=self.index) as recording:
+        with self._opened() as recording:
             wanted = self._wanted(recording, connections)
             own = [connection for connection, carried in wanted.items() if carried.connection in kept]
             for piece in recording.pieces(list(wanted), own, declared, start_ns, end_ns, progress):
                 carried = piece if isinstance(piece, WholeChunk) else self._convert(piece, wanted[piece.connection])
                 if carried is not None:
                     yield carried
-            for loss in recording.losses:
-                self._lose(loss)
 
     def blocks(self, connections: Collection[Connection]) -> Sequence[Block] | None:
         """See `Recording.blocks`."""
-        with open_recording(self._file.path, known=self.index) as recording:
+        with self._opened() as recording:
             return recording.blocks(list(self._wanted(recording, connections)))
 
     def ids(self) -> dict[Connection, tuple[int, int]]:
@@ -185,9 +179,15 @@ class McapLog:
 
     def copy_attachments(self, writer: RecordingWriter) -> None:
         """Carry the file's attachments over."""
-        with open_recording(self._file.path, known=self.index) as recording:
+        with self._opened() as recording:
             for attachment in recording.attachments():
                 writer.attach(attachment)
+
+    @contextlib.contextmanager
+    def _opened(self) -> Iterator[Recording]:
+        """The file; what of it cannot be read is told at the end."""
+        with open_recording(self._file.path, known=self.index) as recording:
+            yield recording
             for loss in recording.losses:
                 self._lose(loss)
 
