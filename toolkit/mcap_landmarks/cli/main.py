@@ -16,6 +16,8 @@ from mcap_landmarks.errors import UsageError
 _NOT_VERBS = {"__init__", "main", "console", "option_groups", "options", "stage_runs", "conversion_options"}
 _READ_NO_LOGS = {"batch", "config", "demo", "generate", "models", "teleop"}
 """Verbs that take no bound on what files may claim; `batch` passes it on."""
+_COMPLETION = "_MCAP_LANDMARKS_COMPLETE"
+"""Set by the shell's script while it asks for completions; the words so far are in one of the variables below."""
 _HELP = "Landmark maps and positions from robot recordings, offline and without ROS."
 
 
@@ -35,7 +37,7 @@ def build(asked: str | None) -> typer.Typer:
         name="mcap-landmarks",
         help=_HELP,
         no_args_is_help=True,
-        add_completion=False,
+        add_completion=asked not in verbs() or _COMPLETION in os.environ,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
@@ -47,7 +49,7 @@ def build(asked: str | None) -> typer.Typer:
         module = importlib.import_module(f"mcap_landmarks.cli.{verb}")
         reads = verb not in _READ_NO_LOGS
         if hasattr(module, "app"):
-            for own in module.app.registered_commands if reads else ():
+            for own in module.app.registered_commands:
                 if not hasattr(own.callback, "__wrapped__"):  # not yet, by an earlier call of this
                     own.callback = spread(own.callback, reads=reads)
             app.add_typer(module.app, name=verb, help=short_help)
@@ -77,6 +79,14 @@ def _root(
     """Take the options before the verb."""
 
 
+def _asked(given: list[str]) -> str | None:
+    """The verb of a command line; where the shell asks for completions, of the line that is being typed."""
+    if _COMPLETION in os.environ:
+        typed = os.environ.get("_TYPER_COMPLETE_ARGS") or os.environ.get("COMP_WORDS", "")
+        given = typed.split()[1:]
+    return next((word for word in given if not word.startswith("-")), None)
+
+
 def run(arguments: list[str] | None = None) -> None:
     """Run the command line and exit with its code."""
     # NumPy's products are of small matrices, which BLAS shares out among threads that mostly wait in a loop for each
@@ -85,7 +95,7 @@ def run(arguments: list[str] | None = None) -> None:
     # OpenCV decodes up to 2**30 pixels by itself, and reads kinds of images whose headers `vision` does not.
     os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(1 << 26))
     given = sys.argv[1:] if arguments is None else arguments
-    asked = next((word for word in given if not word.startswith("-")), None)
+    asked = _asked(given)
     application: Callable[..., object] = build(asked)
     named = f"{asked} " if asked in verbs() else ""
     with heeding_signals():

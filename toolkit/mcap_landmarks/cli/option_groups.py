@@ -6,11 +6,14 @@ import functools
 import inspect
 from collections.abc import Callable
 from inspect import Parameter
-from typing import TYPE_CHECKING, get_type_hints
+from typing import TYPE_CHECKING, get_args, get_type_hints
+
+from typer.models import OptionInfo
 
 from mcap_landmarks import memory
 from mcap_landmarks.cli import options
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -135,9 +138,24 @@ def spread(command: Callable[..., None], *, reads: bool = False) -> Callable[...
             given[name] = group(**{field.name: given.pop(field.name) for field in dataclasses.fields(group)})
         command(**given)
 
+    for parameter in parameters:
+        _name_value(parameter.annotation)
     taking.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     taking.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined] # inspect and typer look there
     return taking
+
+
+_VALUES = {Location: "FILE", str: "TEXT", int: "N", float: "NUMBER", bool: ""}
+"""What help says after an option that does not say it itself; of a flag typer would say `<bool>`, and it takes none."""
+
+
+def _name_value(annotation: object) -> None:
+    kind, *about = get_args(annotation) or (annotation,)
+    while get_args(kind):  # `list[Location] | None`
+        kind = get_args(kind)[0]
+    for option in about:
+        if isinstance(option, OptionInfo) and option.metavar is None and kind in _VALUES:
+            option.metavar = _VALUES[kind]
 
 
 def reading_logs(command: Callable[..., None]) -> Callable[..., None]:
