@@ -7,6 +7,7 @@ import pytest
 from hypothesis import settings
 from mcap_landmarks.networks import cache
 
+from tests.report import results
 from tests.shared import data_folder
 
 NANODET = cache.folder() / "nanodet.onnx"
@@ -61,3 +62,9 @@ def shared_data() -> Path:
     if path is None:
         pytest.skip("no data at ../shared/data; set MCAP_LANDMARKS_DATA to where it lies")
     return path
+
+
+@pytest.fixture(scope="session")
+def whole_result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log with images, scans and truth, and all that localize finds in it; only to be read."""
+    return results.whole_result(tmp_path_factory.mktemp("whole") / "result.mcap")

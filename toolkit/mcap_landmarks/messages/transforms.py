@@ -18,6 +18,10 @@ from mcap_landmarks.messages.parts import (
 )
 from mcap_landmarks.messages.typestore import RosObject
 
+_LITTLE_ENDIAN = b"\0\1"
+_FIRST_NAME = 16
+"""Where in CDR the name of the first frame begins: behind the encapsulation, the count and the stamp."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Transform:
@@ -51,6 +55,24 @@ class TFMessage:
     def from_ros(cls, ros: RosObject) -> Self:
         """See `Message`."""
         return cls(tuple(_from_ros(transform) for transform in ros.transforms))
+
+
+def frames_in(data: bytes | memoryview) -> tuple[str, str] | None:
+    """The frame and the child frame of a message of one transform in little endian, read without decoding the rest.
+
+    None for every other message, and for one that is too short.
+    """
+    if bytes(data[:2]) != _LITTLE_ENDIAN or int.from_bytes(data[4:8], "little") != 1:
+        return None
+    names, start = [], _FIRST_NAME
+    for _ in range(2):
+        size = int.from_bytes(data[start : start + 4], "little")
+        text = bytes(data[start + 4 : start + 4 + size])
+        if not size or len(text) != size:
+            return None
+        names.append(text[:-1].decode(errors="replace"))
+        start += 4 + -(-size // 4) * 4  # lengths are aligned to their size
+    return names[0], names[1]
 
 
 def _to_ros(transform: Transform) -> RosObject:
