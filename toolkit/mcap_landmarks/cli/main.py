@@ -31,14 +31,19 @@ def verbs() -> dict[str, str]:
     return found
 
 
-def build(asked: str | None) -> typer.Typer:
-    """The application, with the verb `asked` for loaded and the others known by name and short help only."""
+def build(asked: str | None, *, has_help: bool = True) -> typer.Typer:
+    """The application, with the verb `asked` for loaded and the others known by name and short help only.
+
+    Of the command's own help typer finds out what its value means before that of a verb is shown, with an import of a
+    tenth of a second; unless it `has_help` only verbs do.
+    """
     app = typer.Typer(
         name="mcap-landmarks",
         help=_HELP,
         no_args_is_help=True,
         add_completion=asked not in verbs() or _COMPLETION in os.environ,
         pretty_exceptions_enable=False,
+        add_help_option=has_help,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(_root)
@@ -94,10 +99,12 @@ def run(arguments: list[str] | None = None) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # OpenCV decodes up to 2**30 pixels by itself, and reads kinds of images whose headers `vision` does not.
     os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(1 << 26))
+    # Pydantic would look through all installed packages for plugins of its own.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
     given = sys.argv[1:] if arguments is None else arguments
     asked = _asked(given)
-    application: Callable[..., object] = build(asked)
     named = f"{asked} " if asked in verbs() else ""
+    application: Callable[..., object] = build(asked, has_help=not named or given[:1] != [asked])
     with heeding_signals():
         code = run_command(application, given, f"see mcap-landmarks {named}--help")
     sys.exit(code)

@@ -13,7 +13,6 @@ from mcap_landmarks.messages.qos import KEY, qos_profile
 from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.messages.typestore import RosObject, definition, typestore
 from mcap_landmarks.sources._foxglove_fields import FieldsOf, JsonFields, RosFields
-from mcap_landmarks.sources._foxglove_protobuf import protobuf_reader
 from mcap_landmarks.sources._foxglove_types import COUNTERPARTS, Counterpart, is_origin, pose_of
 from mcap_landmarks.sources._shape import Carried, Payload
 from mcap_landmarks.stage import Connection
@@ -60,6 +59,8 @@ def _reader(connection: Connection) -> Read:
     if connection.message_encoding == "json":
         return JsonFields.read
     if connection.message_encoding == "protobuf":
+        from mcap_landmarks.sources._foxglove_protobuf import protobuf_reader  # noqa: PLC0415 - seldom needed, and slow
+
         return protobuf_reader(connection.message_type, connection.schema)
     return _ros_reader(connection.message_type, connection.schema)
 
