@@ -27,3 +27,11 @@ class MapError(ToolkitError):
 
 class ModelError(ToolkitError):
     """An ONNX file is missing, cannot be run, or is no model of the kind that is needed."""
+
+
+class ExtensionError(ToolkitError):
+    """An installed package that brings a stage, a detector family or a source of its own cannot be used."""
+
+
+class LossWarning(UserWarning):
+    """Something of a log could not be read, and is missing in what was made of it; of the Python API alone."""

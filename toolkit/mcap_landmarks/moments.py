@@ -1,6 +1,9 @@
-"""Moments as text: RFC 3339 to the nanosecond."""
+"""Moments as text and from text: RFC 3339 to the nanosecond."""
 
+import re
 from datetime import UTC, datetime
+
+from mcap_landmarks.errors import UsageError
 
 LATEST_NS = 2**63 - 1
 """MCAP has unsigned log times; what is later than signed ones can be (year 2262) is damage and counts as this."""
@@ -14,3 +17,24 @@ def moment(time_ns: int) -> str:
     except (OverflowError, ValueError, OSError):
         return str(time_ns)
     return f"{when:%Y-%m-%dT%H:%M:%S}.{rest:09d}Z"
+
+
+def time_ns(text: str | None, option: str) -> int | None:
+    """Nanoseconds since the epoch from RFC 3339 (an offset is required) or an integer.
+
+    Raises:
+        UsageError: the text is neither.
+    """
+    if text is None:
+        return None
+    if text.lstrip("-").isdigit():
+        return int(text)
+    try:
+        when = datetime.fromisoformat(text)
+    except ValueError:
+        when = None
+    if when is None or when.tzinfo is None:
+        raise UsageError(f"{option} {text}: give RFC 3339 with an offset, such as 2026-01-31T12:00:00Z, or nanoseconds")
+    whole = when.replace(microsecond=0)
+    fraction = re.search(r"[.,](\d+)", text)  # datetime keeps microseconds only
+    return int(whole.timestamp()) * 10**9 + (int(fraction[1].ljust(9, "0")[:9]) if fraction else 0)

@@ -8,6 +8,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.moments import time_ns
 
 if TYPE_CHECKING:
     from mcap_landmarks.recording.chunk_form import ChunkForm
@@ -78,8 +79,8 @@ class SelectionOptions:
 
         return Selection(
             tuple(self.topics or ()),
-            options.time_ns(self.start, "--start"),
-            options.time_ns(self.end, "--end"),
+            time_ns(self.start, "--start"),
+            time_ns(self.end, "--end"),
             tuple(self.exclude or ()),
             tuple(self.types or ()),
             tuple(parse_remaps(self.remap or []).items()),

@@ -10,7 +10,7 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, say_json, table
 from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.locations import Location, location
-from mcap_landmarks.moments import moment
+from mcap_landmarks.moments import moment, time_ns
 from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def command(
         if output:
             earlier = earlier_picture("explain", [result])
             stack.enter_context(output_to(output, [result], earlier, overwrite=overwrite))
-        situation, view = read_situation(result, options.time_ns(at, "--at") or 0)
+        situation, view = read_situation(result, time_ns(at, "--at") or 0)
         places = places_of(situation)
         if output:
             _draw(result, situation, places, view, output)

@@ -11,7 +11,7 @@ from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptio
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
-from mcap_landmarks.moments import moment
+from mcap_landmarks.moments import moment, time_ns
 from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def command(
     asked = Given(
         given, images, scans, {"map": map_file, "extrinsics": extrinsics}, use, ["localize.fixed=true"] * fixed
     )
-    asked_ns = options.time_ns(at, "--at")
+    asked_ns = time_ns(at, "--at")
     if asked_ns is not None:
         if output is not None or len(logs) > 1:
             raise UsageError("--at prints one answer for one log: leave -o out, and name a single log")

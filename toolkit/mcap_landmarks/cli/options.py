@@ -1,12 +1,9 @@
 """Options that several verbs take, so that they read alike everywhere."""
 
-import re
-from datetime import datetime
 from typing import Annotated
 
 import typer
 
-from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location, to_read
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document instead of text.")]
@@ -144,27 +141,6 @@ MaxMemory = Annotated[
     ),
 ]
 Method = Annotated[str | None, typer.Option("--method", help="Sets the method of every stage: default or thesis.")]
-
-
-def time_ns(text: str | None, option: str) -> int | None:
-    """Nanoseconds since the epoch from RFC 3339 (an offset is required) or an integer.
-
-    Raises:
-        UsageError: the text is neither.
-    """
-    if text is None:
-        return None
-    if text.lstrip("-").isdigit():
-        return int(text)
-    try:
-        moment = datetime.fromisoformat(text)
-    except ValueError:
-        moment = None
-    if moment is None or moment.tzinfo is None:
-        raise UsageError(f"{option} {text}: give RFC 3339 with an offset, such as 2026-01-31T12:00:00Z, or nanoseconds")
-    whole = moment.replace(microsecond=0)
-    fraction = re.search(r"[.,](\d+)", text)  # datetime keeps microseconds only
-    return int(whole.timestamp()) * 10**9 + (int(fraction[1].ljust(9, "0")[:9]) if fraction else 0)
 
 
 def add_definitions(

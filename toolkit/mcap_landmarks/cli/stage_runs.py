@@ -8,8 +8,8 @@ import typer
 
 from mcap_landmarks.cli.console import PARTIAL, progress, say_json, warn
 from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
-from mcap_landmarks.cli.options import time_ns
 from mcap_landmarks.locations import Location
+from mcap_landmarks.moments import time_ns
 from mcap_landmarks.wording import tallied
 
 if TYPE_CHECKING:

@@ -9,12 +9,11 @@ import numpy as np
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.evaluation import tum
 from mcap_landmarks.evaluation.pose_topics import PoseTrack
-from mcap_landmarks.evaluation.trajectory import Trajectory
+from mcap_landmarks.evaluation.trajectory import VARIANCES, Trajectory
 from mcap_landmarks.moments import moment
 
 SCHEMA = "mcap-landmarks/trajectory/1"
 _UPPER = np.triu_indices(3)
-_VARIANCES = "var_x_m2,cov_xy_m2,cov_x_heading_m_rad,var_y_m2,cov_y_heading_m_rad,var_heading_rad2"
 
 
 class TrajectoryFormat(StrEnum):
@@ -60,7 +59,7 @@ def _kitti(trajectory: Trajectory) -> str:
 
 def _csv(trajectory: Trajectory) -> str:
     """A line per pose; what is unknown is empty."""
-    lines = [f"time_ns,time,x_m,y_m,heading_rad,{_VARIANCES}\n"]
+    lines = [f"time_ns,time,x_m,y_m,heading_rad,{','.join(VARIANCES)}\n"]
     for time_ns, pose, spread in _rows(trajectory):
         numbers = [*pose, *(spread[_UPPER].tolist() if spread is not None else [None] * 6)]
         cells = [str(time_ns), moment(time_ns), *("" if number is None else repr(number) for number in numbers)]

@@ -22,6 +22,8 @@ from mcap_landmarks.messages.typestore import definition
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import Recording, open_recording
 
+WithinNs = tuple[int | None, int | None]
+"""Log times to read from, and to stop before; None where there is no such bound."""
 _Message = PoseStamped | PoseWithCovarianceStamped | Odometry
 _TYPES: dict[str, type[_Message]] = {
     message.ROS_TYPE: message for message in (PoseStamped, PoseWithCovarianceStamped, Odometry)
@@ -84,18 +86,29 @@ def read_poses(
         UsageError: several topics or frames fit, or the named one does not.
     """
     with open_recording(path) as recording:
-        ranks = _candidates(recording)
-        chosen = topic or _default(path, ranks)
-        if chosen in ranks:
-            rows = _read(recording, chosen, progress)
-        else:
-            rows = _transforms(recording, chosen, child, progress)
-        losses = list(recording.losses)
-        if rows.broken:
-            losses.insert(0, f"{chosen}: {rows.broken} messages could not be decoded")
-        trajectory, notes = _trajectory(rows)
+        return poses_in(recording, topic, child, progress=progress)
+
+
+def poses_in(
+    recording: Recording,
+    topic: str | None = None,
+    child: str | None = None,
+    within_ns: WithinNs = (None, None),
+    progress: Progress | None = None,
+) -> PoseTrack:
+    """The same of an open recording, from a log time on and before another; raises the same."""
+    ranks = _candidates(recording)
+    chosen = topic or _default(recording.path, ranks)
+    if chosen in ranks:
+        rows = _read(recording, chosen, within_ns, progress)
+    else:
+        rows = _transforms(recording, chosen, child, within_ns, progress)
+    losses = list(recording.losses)
+    if rows.broken:
+        losses.insert(0, f"{chosen}: {rows.broken} messages could not be decoded")
+    trajectory, notes = _trajectory(rows)
     if not len(trajectory):
-        raise RecordingError(f"{path}: {chosen} has no pose that can be used; {'; '.join([*notes, *losses])}")
+        raise RecordingError(f"{recording.path}: {chosen} has no pose that can be used; {'; '.join([*notes, *losses])}")
     others = tuple(other for other in ranks if other != chosen)
     return PoseTrack(chosen, rows.frames.most_common(1)[0][0], trajectory, others, tuple(notes), tuple(losses))
 
@@ -130,7 +143,7 @@ def _default(path: Location, ranks: dict[str, int]) -> str:
     return best[0]
 
 
-def _read(recording: Recording, topic: str, progress: Progress | None) -> _Rows:
+def _read(recording: Recording, topic: str, within_ns: WithinNs, progress: Progress | None) -> _Rows:
     rows = _Rows()
     for connection in recording.connections(topic):
         if connection.read_as not in _TYPES:
@@ -140,7 +153,7 @@ def _read(recording: Recording, topic: str, progress: Progress | None) -> _Rows:
         fields = ["header.stamp", "header.frame_id", f"{pose}.position", f"{pose}.orientation"]
         fields += [] if message is PoseStamped else ["pose.covariance"]
         layout = layout_of(message.ROS_TYPE, definition(message.ROS_TYPE))
-        found = recording.columns(connection, layout, fields, progress=progress)
+        found = recording.columns(connection, layout, fields, *within_ns, progress)
         stamps, frames, positions, quaternions, *spread = (found.table.columns[name].values for name in fields)
         planar = spread[0].reshape(-1, 6, 6)[:, PLANAR[0], PLANAR[1]] if spread else None
         rows.add((found.log_time_ns, stamps[:, 0]), (positions, quaternions), planar)
@@ -150,7 +163,9 @@ def _read(recording: Recording, topic: str, progress: Progress | None) -> _Rows:
     return rows
 
 
-def _transforms(recording: Recording, topic: str, child: str | None, progress: Progress | None) -> _Rows:
+def _transforms(
+    recording: Recording, topic: str, child: str | None, within_ns: WithinNs, progress: Progress | None
+) -> _Rows:
     """The transforms of a topic between two frames."""
     wanted = [one for one in recording.connections(topic) if one.read_as == TFMessage.ROS_TYPE]
     if not wanted:
@@ -158,7 +173,7 @@ def _transforms(recording: Recording, topic: str, child: str | None, progress: P
         found = ", ".join(one.message_type for one in recording.connections(topic)) or "not in the log"
         raise UsageError(f"{recording.path}: {topic} is {found}; --topic takes {known}")
     moves, broken = dict[tuple[str, str], _Rows](), 0
-    for raw in recording.messages(wanted, progress=progress):
+    for raw in recording.messages(wanted, *within_ns, progress):
         try:
             transforms = decode(TFMessage, raw.data).transforms
         except MessageError:

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from mcap_landmarks.geometry.se2 import Array, interpolate
 
 Indices = NDArray[np.int64]
+VARIANCES = ("var_x_m2", "cov_xy_m2", "cov_x_heading_m_rad", "var_y_m2", "cov_y_heading_m_rad", "var_heading_rad2")
+"""The upper triangle of a pose's covariance, row by row."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -19,7 +19,8 @@ class Format(StrEnum):
     JSON = "json"
 
 
-_OF_SUFFIX = {".txt": Format.THESIS, ".csv": Format.CSV, ".json": Format.JSON}
+SUFFIXES = {".txt": Format.THESIS, ".csv": Format.CSV, ".json": Format.JSON}
+"""What the names of such files end with."""
 
 
 def format_of(path: Location) -> Format:
@@ -29,9 +30,9 @@ def format_of(path: Location) -> Format:
         UsageError: it stands for none.
     """
     try:
-        return _OF_SUFFIX[path.suffix.lower()]
+        return SUFFIXES[path.suffix.lower()]
     except KeyError:
-        known = ", ".join(f"{suffix} ({form})" for suffix, form in _OF_SUFFIX.items())
+        known = ", ".join(f"{suffix} ({form})" for suffix, form in SUFFIXES.items())
         raise UsageError(f"{path}: the name does not tell the format; use {known}, or --format") from None
 
 

@@ -1,7 +1,9 @@
 """The landmark map in memory: landmarks, groups seen together, and what the map was made from."""
 
+from collections import Counter
 from dataclasses import dataclass, replace
-from typing import Literal, TypeVar, get_args
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,6 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from mcap_landmarks.classes import is_movable
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.se2 import Array
+from mcap_landmarks.locations import location
+from mcap_landmarks.structured import StructuredArray, objects
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 SourceKind = Literal["recording", "reference", "import"]
@@ -96,6 +103,58 @@ class LandmarkMap:
 
     def __len__(self) -> int:
         return len(self.ids)
+
+    def __repr__(self) -> str:
+        classes = ", ".join(f"{count} {name}" for name, count in sorted(Counter(self.classes).items()))
+        return f"<LandmarkMap of {len(self)} landmarks, {int(self.tentative.sum())} tentative: {classes or 'none'}>"
+
+    @classmethod
+    def read(cls, path: str | Path) -> "LandmarkMap":
+        """The map in a landmark database, or in a file that `landmarks import` takes (.csv, .json, .txt).
+
+        Raises:
+            MapError: there is no such file, or no map in it.
+        """
+        from mcap_landmarks.maps.map_files import read_map_file  # noqa: PLC0415 - it imports this
+
+        return read_map_file(location(path))
+
+    def write(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write the map as a landmark database, or as `landmarks export` does (.csv, .json, .txt).
+
+        Raises:
+            UsageError: there is a file already that is not to be overwritten.
+            ToolkitError: the map has not what the format needs, or the file cannot be written.
+        """
+        from mcap_landmarks.maps.map_files import write_map_file  # noqa: PLC0415 - it imports this
+
+        write_map_file(location(path), self, overwrite=overwrite)
+
+    @property
+    def landmarks(self) -> StructuredArray:
+        """A row per landmark: id, class, x_m, y_m, var_x_m2, cov_xy_m2, var_y_m2, radius_m, sightings, tentative."""
+        return StructuredArray.of(
+            {
+                "id": objects(self.ids),
+                "class": objects(self.classes),
+                "x_m": self.positions_xy[:, 0],
+                "y_m": self.positions_xy[:, 1],
+                "var_x_m2": self.covariances[:, 0, 0],
+                "cov_xy_m2": self.covariances[:, 0, 1],
+                "var_y_m2": self.covariances[:, 1, 1],
+                "radius_m": self.radii_m,
+                "sightings": self.sightings,
+                "tentative": self.tentative,
+            }
+        )
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """`landmarks` as a data frame.
+
+        Raises:
+            UsageError: pandas is not installed.
+        """
+        return self.landmarks.to_pandas()
 
     @property
     def movable(self) -> NDArray[np.bool_]:

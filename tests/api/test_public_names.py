@@ -1,0 +1,37 @@
+"""The public names: small in number, quick to import, typed, and each of them there."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import mcap_landmarks as ml
+import pytest
+
+TREE = ast.parse(Path(ml.__file__).read_text())
+
+
+def test_the_names_for_checkers_are_those_that_are_loaded() -> None:
+    imported = {alias.name for node in ast.walk(TREE) if isinstance(node, ast.ImportFrom) for alias in node.names}
+    assert imported - {"TYPE_CHECKING", "version"} == set(ml.__all__)
+    assert list(ml.__all__) == sorted(ml.__all__, key=lambda name: (not name[0].isupper(), name))
+    for name in ml.__all__:
+        assert getattr(ml, name) is not None
+    assert set(ml.__all__) <= set(dir(ml))
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        assert ml.nothing
+
+
+def test_every_error_is_public() -> None:
+    def below(kind: type[Exception]) -> set[str]:
+        return {kind.__name__}.union(*(below(one) for one in kind.__subclasses__() if not one.__name__.startswith("_")))
+
+    assert below(ml.ToolkitError) <= set(ml.__all__)
+
+
+def test_importing_the_package_loads_nothing() -> None:
+    asked = (
+        "import sys, mcap_landmarks; print([name for name in ('numpy', 'importlib.metadata') if name in sys.modules])"
+    )
+    shown = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert shown.stdout.strip() == "[]"

@@ -1,0 +1,1 @@
+"""The Python API: what the verbs do and what logs hold, for notebooks and scripts; `mcap_landmarks` has its names."""
