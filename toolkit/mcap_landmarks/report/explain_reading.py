@@ -41,6 +41,7 @@ from mcap_landmarks.manifest import RUN, stage_records, told
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.codec import M, Message, decode
 from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.header import stamp_in
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.scene import SceneObjects
@@ -48,16 +49,17 @@ from mcap_landmarks.messages.velocities import SceneVelocities
 from mcap_landmarks.moments import moment
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.report.box_outcomes import LostBox, lost_boxes
+from mcap_landmarks.report.messages_around import BESIDE_NS, MessagesAround
 from mcap_landmarks.stage import Channel, Config, Connection, RawMessage
 from mcap_landmarks.vision.pixels import rgb_from_message
 
 _C = TypeVar("_C", bound=Config)
 
 _AROUND_NS = 3 * 10**9
-_BESIDE_NS = 10**9
-"""How far from the asked time the bundle may be, and from the bundle what its sensors saw."""
+"""How far from the asked time the bundle may be."""
 _OF_BUNDLE = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, SCAN_OBJECTS, CLUSTERED_CLOUD, SCENE_VELOCITIES)
-_BESIDE = (DETECTIONS, CAMERA_IMAGE, CAMERA_INFO, SCAN)
+_OF_CAMERAS = (DETECTIONS, CAMERA_IMAGE, CAMERA_INFO)
+_BESIDE = (*_OF_CAMERAS, SCAN)
 
 
 class Picture(NamedTuple):
@@ -97,41 +99,6 @@ class SensorData:
         return tuple(one for lost in known for one in lost) if known and len(known) == len(told) else None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Around:
-    """The messages around a moment, by channel, time and camera, which is empty where it does not matter."""
-
-    messages: dict[Channel[Message], dict[tuple[int, str], Message]]
-
-    def at(self, channel: Channel[M], time_ns: int) -> M | None:
-        """The message of a time."""
-        message = self.messages[channel].get((time_ns, ""))
-        return message if isinstance(message, channel.message) else None
-
-    def nearest(self, channel: Channel[Message], time_ns: int, camera: str) -> Message | None:
-        """The message of a camera that is nearest to a time, None if it is too far away."""
-        messages = self.messages[channel]
-        times = [key for key in messages if key[1] == camera]
-        nearest = min(times, key=lambda key: abs(key[0] - time_ns), default=None)
-        return None if nearest is None or abs(nearest[0] - time_ns) > _BESIDE_NS else messages[nearest]
-
-    def camera_info(self, detections: Detections) -> CameraInfo | None:
-        """The CameraInfo of the frame of some detections that is nearest to them; the only frame's may have another."""
-        infos, frame = self.messages[CAMERA_INFO], plain(detections.frame_id)
-        keys = [key for key in infos if key[1] == frame]
-        if not keys and len({camera for _, camera in infos}) == 1:
-            keys = [*infos]
-        nearest = min(keys, key=lambda key: abs(key[0] - detections.stamp_ns), default=None)
-        found = None if nearest is None else infos[nearest]
-        return found if isinstance(found, CameraInfo) else None
-
-    def detections(self, time_ns: int) -> dict[str, Detections]:
-        """The detections nearest to a time, by camera."""
-        cameras = sorted({camera for _, camera in self.messages[DETECTIONS]})
-        found = {camera: self.nearest(DETECTIONS, time_ns, camera) for camera in cameras}
-        return {camera: message for camera, message in found.items() if isinstance(message, Detections)}
-
-
 def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
     """The bundle of a log that is nearest in time, and what its sensors saw.
 
@@ -139,29 +106,115 @@ def read_situation(path: Location, at_ns: int) -> tuple[Situation, SensorData]:
         RecordingError: the log cannot be read, or has no bundle within three seconds.
     """
     with open_recording(path) as recording:
+        return Situations(recording).nearest(at_ns)
+
+
+class Situations:
+    """The bundles of an open recording, each with what its sensors saw; what holds for all of them is read once."""
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
         records = stage_records(recording.metadata).values()
         choice = chosen_before(recording, [record.options for record in records])
-        channels = {c: channel for channel in (*_OF_BUNDLE, *_BESIDE) for c in _connections(recording, channel, choice)}
-        found = _Around({channel: {} for channel in (*_OF_BUNDLE, *_BESIDE)})
-        frames = cameras_of(recording, choice).frames()
-        images = images_of(recording, choice, _connections(recording, CAMERA_INFO, choice))
-        around = recording.messages(channels, at_ns - _AROUND_NS, at_ns + _AROUND_NS)
-        for raw in chain(_first_infos(recording, channels), around):
-            channel = channels[raw.connection]
-            with contextlib.suppress(MessageError, RecordingError):
-                message = _read(raw, channel, images)
-                camera = frames.get(raw.connection.topic, "")
-                if isinstance(message, Detections | CameraInfo):
-                    camera = plain(message.frame_id)
-                found.messages[channel][getattr(message, "stamp_ns", 0) or raw.log_time_ns, camera] = message
+        channels = (*_OF_BUNDLE, *_BESIDE)
+        self._channels = {c: channel for channel in channels for c in _connections(recording, channel, choice)}
+        self._cameras = cameras_of(recording, choice).frames()
+        self._images = images_of(recording, choice, _connections(recording, CAMERA_INFO, choice))
+        self._first_infos = list(_first_infos(recording, self._channels))
+        self._landmarks = _once(recording, MAP)
+        self._frames = _frames(recording)
+        self._localize = _config(recording, LocalizeConfig, "localize")
+        self._fuse = _config(recording, FuseConfig, "fuse")
+
+    def nearest(self, at_ns: int) -> tuple[Situation, SensorData]:
+        """The bundle that is nearest in time.
+
+        Raises:
+            RecordingError: there is none within three seconds.
+        """
+        found = self._around(at_ns, _AROUND_NS)
         bundles = found.messages[MATCH] or found.messages[SCENE_OBJECTS]
         if not bundles:
             raise RecordingError(
-                f"{path}: no bundle with scene objects within 3 s of {moment(at_ns)}; the log goes from "
-                f"{_span(recording)}, and localize writes what is explained"
+                f"{self._recording.path}: no bundle with scene objects within 3 s of {moment(at_ns)}; the log goes "
+                f"from {_span(self._recording)}, and localize writes what is explained"
             )
         stamp_ns = min((time_ns for time_ns, _ in bundles), key=lambda time_ns: abs(time_ns - at_ns))
-        return _situation(recording, found, stamp_ns), _view(recording, found, stamp_ns)
+        return self._situation(found, stamp_ns), self._view(found, stamp_ns)
+
+    def of(self, stamp_ns: int, logged_ns: int) -> tuple[Situation, SensorData]:
+        """The bundle of a stamp, whose messages were logged at a time; it may have nothing but what was detected."""
+        found = self._around(logged_ns, BESIDE_NS, stamp_ns)
+        return self._situation(found, stamp_ns), self._view(found, stamp_ns)
+
+    def _around(self, logged_ns: int, reach_ns: int, stamp_ns: int | None = None) -> MessagesAround:
+        """The messages that were logged around a time; those of other bundles than that of a stamp are passed over."""
+        found = MessagesAround({channel: {} for channel in (*_OF_BUNDLE, *_BESIDE)})
+        around = self._recording.messages(self._channels, max(0, logged_ns - reach_ns), logged_ns + reach_ns)
+        for raw in chain(self._first_infos, around):
+            channel = self._channels[raw.connection]
+            with contextlib.suppress(MessageError, RecordingError):
+                if stamp_ns is not None and channel not in _OF_CAMERAS and stamp_in(raw.data) not in {0, stamp_ns}:
+                    continue
+                message = _read(raw, channel, self._images)
+                camera = self._cameras.get(raw.connection.topic, "")
+                if isinstance(message, Detections | CameraInfo):
+                    camera = plain(message.frame_id)
+                found.messages[channel][getattr(message, "stamp_ns", 0) or raw.log_time_ns, camera] = message
+        return found
+
+    def _situation(self, found: MessagesAround, stamp_ns: int) -> Situation:
+        pose, spread = found.at(POSE, stamp_ns), found.at(POSE_COVARIANCE, stamp_ns)
+        return Situation(
+            stamp_ns,
+            found.at(SCENE_OBJECTS, stamp_ns),
+            found.at(MATCH, stamp_ns),
+            self._landmarks,
+            None if pose is None else pose.pose,
+            None if spread is None else spread.planar_covariance,
+            found.at(SCAN_OBJECTS, stamp_ns),
+            tuple(found.detections(stamp_ns).values()),
+            self._localize,
+        )
+
+    def _view(self, found: MessagesAround, stamp_ns: int) -> SensorData:
+        pictures = _pictures(found, stamp_ns)
+        scene, cloud = found.at(SCENE_OBJECTS, stamp_ns), found.at(CLUSTERED_CLOUD, stamp_ns)
+        if scene is not None and cloud is not None:
+            pictures = [self._beside_cloud(found, picture, scene, cloud) for picture in pictures]
+            return SensorData(tuple(pictures), cloud=cloud, velocities=found.at(SCENE_VELOCITIES, stamp_ns))
+        scan, seen = found.at(SCAN, stamp_ns), scene or found.at(SCAN_OBJECTS, stamp_ns)
+        if scan is None or seen is None:
+            return SensorData(tuple(pictures))
+        return SensorData(tuple(pictures), self._points(scan, seen.frame_id))
+
+    def _beside_cloud(
+        self, found: MessagesAround, picture: Picture, scene: SceneObjects, cloud: ClusteredCloud
+    ) -> Picture:
+        """The same with the view of the camera and the boxes that came to nothing, where the log tells enough of them.
+
+        The way that the robot makes between scan and image is left out: it matters little to a picture.
+        """
+        detections = picture.detections
+        info = None if detections is None else found.camera_info(detections)
+        if detections is None or info is None:
+            return picture
+        with contextlib.suppress(RecordingError):
+            base_from_camera = self._frames.lookup(scene.frame_id, info.frame_id or detections.frame_id)
+            camera = camera_from_info(info, rectified=self._fuse.rectified)
+            view = CameraView.at(camera, base_from_camera, np.zeros(3), 0.0)
+            return picture._replace(view=view, lost=lost_boxes(detections, scene, cloud, view, self._fuse))
+        return picture
+
+    def _points(self, scan: LaserScan, base: str) -> Array:
+        """Where the beams ended (N, 2), in the base frame if transforms lead there, else in the scanner's own."""
+        ranges_m = echoes(scan.ranges_m, scan.range_min_m, scan.range_max_m)
+        rows = np.flatnonzero(np.isfinite(ranges_m))
+        angle, range_m = scan.angle_min_rad + rows * scan.angle_increment_rad, ranges_m[rows]
+        points = np.column_stack([range_m * np.cos(angle), range_m * np.sin(angle), np.zeros(len(rows))])
+        with contextlib.suppress(RecordingError):
+            points = apply(self._frames.lookup(base, scan.frame_id), points)
+        return points[:, :2]
 
 
 def _span(recording: Recording) -> str:
@@ -185,21 +238,6 @@ def _first_infos(recording: Recording, channels: Mapping[Connection, Channel[Mes
             yield from islice(recording.messages([connection]), 1)
 
 
-def _situation(recording: Recording, found: _Around, stamp_ns: int) -> Situation:
-    pose, spread = found.at(POSE, stamp_ns), found.at(POSE_COVARIANCE, stamp_ns)
-    return Situation(
-        stamp_ns,
-        found.at(SCENE_OBJECTS, stamp_ns),
-        found.at(MATCH, stamp_ns),
-        _once(recording, MAP),
-        None if pose is None else pose.pose,
-        None if spread is None else spread.planar_covariance,
-        found.at(SCAN_OBJECTS, stamp_ns),
-        tuple(found.detections(stamp_ns).values()),
-        _config(recording, LocalizeConfig, "localize"),
-    )
-
-
 def _config(recording: Recording, config: type[_C], stage: str) -> _C:
     """What a stage ran with, as the log tells; the defaults for what it does not tell, or tells in other words."""
     given: dict[str, object] = told(recording.metadata.get(RUN, {}).get("config"), {})
@@ -214,19 +252,7 @@ def _schema(connection: Connection) -> str:
     return connection.schema.decode(errors="replace")
 
 
-def _view(recording: Recording, found: _Around, stamp_ns: int) -> SensorData:
-    pictures = _pictures(found, stamp_ns)
-    scene, cloud = found.at(SCENE_OBJECTS, stamp_ns), found.at(CLUSTERED_CLOUD, stamp_ns)
-    if scene is not None and cloud is not None:
-        pictures = [_beside_cloud(recording, found, picture, scene, cloud) for picture in pictures]
-        return SensorData(tuple(pictures), cloud=cloud, velocities=found.at(SCENE_VELOCITIES, stamp_ns))
-    scan = found.at(SCAN, stamp_ns)
-    if scan is None or scene is None:
-        return SensorData(tuple(pictures))
-    return SensorData(tuple(pictures), _points(recording, scan, scene.frame_id))
-
-
-def _pictures(found: _Around, stamp_ns: int) -> list[Picture]:
+def _pictures(found: MessagesAround, stamp_ns: int) -> list[Picture]:
     """What every camera saw: those that there are images of, and then those that there are boxes of only."""
     pictures, detections = list[Picture](), found.detections(stamp_ns)
     for camera in sorted({camera for _, camera in found.messages[CAMERA_IMAGE]}):
@@ -238,37 +264,6 @@ def _pictures(found: _Around, stamp_ns: int) -> list[Picture]:
                 pixels = rgb_from_message(image)
         pictures.append(Picture(pixels, boxes))
     return [*pictures, *(Picture(None, boxes) for boxes in detections.values())]
-
-
-def _beside_cloud(
-    recording: Recording, found: _Around, picture: Picture, scene: SceneObjects, cloud: ClusteredCloud
-) -> Picture:
-    """The same with the view of the camera and the boxes that came to nothing, where the log tells enough of them.
-
-    The way that the robot makes between scan and image is left out: it matters little to a picture.
-    """
-    detections = picture.detections
-    info = None if detections is None else found.camera_info(detections)
-    if detections is None or info is None:
-        return picture
-    config = _config(recording, FuseConfig, "fuse")
-    with contextlib.suppress(RecordingError):
-        base_from_camera = _frames(recording).lookup(scene.frame_id, info.frame_id or detections.frame_id)
-        camera = camera_from_info(info, rectified=config.rectified)
-        view = CameraView.at(camera, base_from_camera, np.zeros(3), 0.0)
-        return picture._replace(view=view, lost=lost_boxes(detections, scene, cloud, view, config))
-    return picture
-
-
-def _points(recording: Recording, scan: LaserScan, base: str) -> Array:
-    """Where the beams ended (N, 2), in the base frame if transforms lead there, else in the scanner's own."""
-    ranges_m = echoes(scan.ranges_m, scan.range_min_m, scan.range_max_m)
-    rows = np.flatnonzero(np.isfinite(ranges_m))
-    angle, range_m = scan.angle_min_rad + rows * scan.angle_increment_rad, ranges_m[rows]
-    points = np.column_stack([range_m * np.cos(angle), range_m * np.sin(angle), np.zeros(len(rows))])
-    with contextlib.suppress(RecordingError):
-        points = apply(_frames(recording).lookup(base, scan.frame_id), points)
-    return points[:, :2]
 
 
 def _frames(recording: Recording) -> FrameTree:
