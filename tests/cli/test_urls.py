@@ -42,6 +42,7 @@ LINES = {
     "models get": "models get nanodet --from {archive}",
     "plot": "plot {inputs} -o {output}",
     "recover": "recover {log} -o {output} --definitions {definitions}",
+    "report": "report {result} -o {output} --reference {reference}",
     "run": "run {logs} -o {output} --stages detect,cluster,fuse,localize --map {map_file} --model {model} "
     "--names {names} --extrinsics {extrinsics} --config {config_file}",
 }
@@ -49,6 +50,7 @@ LINES = {
 ENDINGS = {
     **dict.fromkeys(("explain", "plot", "models check", "models audition"), "png"),
     **dict.fromkeys(("landmarks import", "landmarks export"), "json"),
+    "report": "html",
 }
 EACH = [(verb, name) for verb, line in LINES.items() for name in re.findall(r"{(\w+)}", line)]
 

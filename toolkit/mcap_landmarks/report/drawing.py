@@ -20,8 +20,10 @@ from mcap_landmarks.maps.model import Group
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.progress import Progress
 
-_MAX_GAP_NS = 5 * 10**8
-"""The truth is interpolated over gaps up to this, as `evaluate` does by default."""
+PAIRING = partial(interpolated, max_gap_ns=5 * 10**8)
+"""The truth is interpolated over gaps up to half a second, as `evaluate` does by default."""
+_RADII_95 = 2.4477
+"""An ellipse of so many sigmas holds 95 % of a normal distribution of the plane."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +63,7 @@ def gather(paths: Sequence[Location], *, aligned: bool, progress: Progress | Non
         losses.extend(f"{path}: {problem}" for problem in problems)
         groups = read_map(path).groups if not result.bundles and result.landmarks is not None else ()
         try:
-            drawing = _with(drawing, path.stem, result, reference, groups, aligned=aligned)
+            drawing = with_run(drawing, path.stem, result, reference, groups, aligned=aligned)
         except UsageError as error:
             raise UsageError(f"{path}: {error}") from error
     if drawing.landmarks is None and drawing.objects is None and not drawing.runs:
@@ -71,9 +73,14 @@ def gather(paths: Sequence[Location], *, aligned: bool, progress: Progress | Non
     return drawing, losses
 
 
-def _with(
+def with_run(
     drawing: Drawing, name: str, result: RunResult, reference: Reference, groups: tuple[Group, ...], *, aligned: bool
 ) -> Drawing:
+    """The drawing with one more run: its poses, the landmarks and objects that the drawing still lacks.
+
+    Raises:
+        UsageError: the poses cannot be `aligned`.
+    """
     landmarks = result.drawn if result.landmarks is None else result.landmarks
     if drawing.landmarks is None and landmarks is not None:
         drawing = replace(drawing, landmarks=landmarks, groups=groups)
@@ -81,8 +88,7 @@ def _with(
         drawing = replace(drawing, objects=reference.objects)
     if not len(result.trajectory) and reference.trajectory is None:
         return drawing
-    pairing = partial(interpolated, max_gap_ns=_MAX_GAP_NS)
-    scored = score(result.trajectory, reference, pairing, aligned=aligned)
+    scored = score(result.trajectory, reference, PAIRING, aligned=aligned)
     estimate = result.trajectory
     if scored.alignment is not None:
         transform = scored.alignment.reference_from_estimate
@@ -116,6 +122,13 @@ def _moved(drawing: Drawing, reference_from_map: Array) -> Drawing:
             covariances=turn @ landmarks.covariances @ turn.T,
         )
     return replace(drawing, landmarks=landmarks, groups=groups)
+
+
+def regions_95(covariances: Array) -> tuple[Array, Array]:
+    """Semi-axes (N, 2), the larger one first, and its directions (N,) in rad of 95 % regions; covariances (N, 2, 2)."""
+    variance, axis = np.linalg.eigh(covariances)
+    radii: Array = _RADII_95 * np.sqrt(np.maximum(variance[:, ::-1], 0.0))
+    return radii, np.arctan2(axis[:, 1, 1], axis[:, 0, 1])
 
 
 def breaks(trajectory: Trajectory, gap_ns: int = 2 * 10**9) -> Array:

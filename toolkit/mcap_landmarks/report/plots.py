@@ -16,7 +16,7 @@ from mcap_landmarks.evaluation.pose_metrics import FALSE_M
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.locations import Location
 from mcap_landmarks.maps.model import Group
-from mcap_landmarks.report.drawing import Drawing, Run, breaks, follows, waypoints
+from mcap_landmarks.report.drawing import Drawing, Run, breaks, follows, regions_95, waypoints
 
 FORMATS = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}, "pdf": {"CreationDate": None}}
 """Formats, and the metadata of each that would tell the clock or the program's version."""
@@ -27,8 +27,6 @@ _PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#
 _MARKERS = "osD^vPXp"
 _TRUTH, _GROUP, _ERROR = "#8A8F98", "#6B7280", "#DC2626"
 _RUNS = ("#111827", "#1D4ED8", "#B45309", "#047857", "#7E22CE")
-_RADII_95 = 2.4477
-"""An ellipse of so many sigmas holds 95 % of a normal distribution of the plane."""
 _ARROWS = 12
 """So many headings along a path can be told from each other at the size of a page."""
 _MOST_LABELS = 60
@@ -137,12 +135,11 @@ def draw_ellipses(axes: Axes, positions_xy: Array, covariances: Array) -> None:
     known = covariances.any(axis=(1, 2))
     if not known.any():
         return
-    variance, axis = np.linalg.eigh(covariances[known])
-    radii = _RADII_95 * np.sqrt(variance)
+    radii, directions_rad = regions_95(covariances[known])
     ellipses = EllipseCollection(
-        2 * radii[:, 1],
         2 * radii[:, 0],
-        np.degrees(np.arctan2(axis[:, 1, 1], axis[:, 0, 1])),
+        2 * radii[:, 1],
+        np.degrees(directions_rad),
         units="xy",
         offsets=positions_xy[known],
         offset_transform=axes.transData,

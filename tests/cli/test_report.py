@@ -1,0 +1,67 @@
+"""The verb report: what it writes and prints, without a browser."""
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+from mcap_landmarks.channels import TRUTH_POSE
+
+from tests.cli.calls import call, refused, schema_of
+from tests.diff.recordings import localized_log, localized_messages, write
+
+APPENDIX_D = Path(__file__).parents[1] / "data" / "thesis_appendix_d.txt"
+MAP_DB = Path(__file__).parents[1] / "golden" / "map.db"
+
+
+def test_the_same_bytes_and_a_document(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, page = localized_log(tmp_path / "r.mcap"), tmp_path / "r.html"
+    assert call("report", log, "-o", page, "--json") == 0
+    document = json.loads(capsys.readouterr().out)
+    jsonschema.validate(document, schema_of("report"))
+    assert document["results"] == [{"name": "r.mcap", "all": 5, "shown": 5, "detailed": 5, "pictures": 0}]
+    first = page.read_bytes()
+    assert document["bytes"] == len(first)
+    assert call("report", log, "-o", page) == 0  # an earlier result of the same may be replaced
+    assert page.read_bytes() == first
+    page.write_text("mine")
+    assert "--overwrite" in refused(capsys, 2, "report", log, "-o", page)
+
+
+def test_the_policy_forbids_all_network(tmp_path: Path) -> None:
+    assert call("report", localized_log(tmp_path / "r.mcap"), "-o", tmp_path / "r.html") == 0
+    text = (tmp_path / "r.html").read_text()
+    assert "default-src &#39;none&#39;; script-src &#39;sha256-" in text
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [(MAP_DB, " landmarks of 3 classes."), (APPENDIX_D, "20 positions were computed.")],
+)
+def test_a_map_and_the_thesis_have_a_page(source: Path, said: str, tmp_path: Path) -> None:
+    assert call("report", source, "-o", tmp_path / "p.html") == 0
+    text = (tmp_path / "p.html").read_text()
+    assert said in text
+    assert "has no bundles to look at" in text
+
+
+def test_what_is_missing_is_said_with_what_to_run(tmp_path: Path) -> None:
+    log = write(tmp_path / "r.mcap", [entry for entry in localized_messages() if entry[0] != TRUTH_POSE])
+    assert call("report", log, "-o", tmp_path / "r.html") == 0
+    text = (tmp_path / "r.html").read_text()
+    assert "There is no truth in r.mcap" in text
+    assert "--reference" in text
+    assert "no landmarks are drawn" in text
+
+
+def test_trouble_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, page = localized_log(tmp_path / "r.mcap"), tmp_path / "r.html"
+    assert "ends with .html" in refused(capsys, 2, "report", log, "-o", tmp_path / "r.pdf")
+    assert "none.mcap" in refused(capsys, 1, "report", tmp_path / "none.mcap", "-o", page)
+    bare = write(tmp_path / "bare.mcap", [entry for entry in localized_messages() if entry[0] == TRUTH_POSE])
+    assert "holds no results to show; run localize" in refused(capsys, 1, "report", bare, "-o", page)
+    assert not page.exists()
+    log.write_bytes(log.read_bytes()[:-200])
+    assert call("report", log, "-o", page, "--lenient") == 3
+    assert "warning: " in capsys.readouterr().err
+    assert "Not all of the file could be read" in page.read_text()

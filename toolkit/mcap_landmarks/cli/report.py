@@ -1,0 +1,62 @@
+"""Write a page to look at and to send: one HTML file that opens offline."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mcap_landmarks.cli import options
+from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, warn
+from mcap_landmarks.cli.option_groups import reading_logs
+from mcap_landmarks.locations import Location, location, size_of
+
+if TYPE_CHECKING:
+    from mcap_landmarks.report.page.written_report import WrittenReport
+
+
+@reading_logs
+def command(
+    result: Annotated[
+        Location,
+        typer.Argument(
+            metavar="RESULT", parser=location, help="Logs with results, a MAP.db, or results.txt as in Appendix D."
+        ),
+    ],
+    output: Annotated[
+        Location, typer.Option("-o", "--output", parser=location, help="The page to write, such as report.html.")
+    ],
+    align: Annotated[
+        bool, typer.Option("--align", help="Move estimates by the SE(2) that fits the truth best.")
+    ] = False,
+    reference: Annotated[
+        Location | None,
+        typer.Option("--reference", parser=location, help="Where the truth is: a log, or a trajectory (.tum, .txt)."),
+    ] = None,
+    overwrite: options.Overwrite = False,
+    json: options.Json = False,
+) -> None:
+    """Write one HTML file about RESULT that opens offline: map, errors, every bundle with its image and decision."""
+    from mcap_landmarks.report.page.written_report import check_report, written_report
+    from mcap_landmarks.runs.replacing import earlier_picture, output_to
+
+    check_report(output)
+    read = [result, *([reference] if reference is not None else [])]
+    with (
+        output_to(output, read, earlier_picture("report", [result]), overwrite=overwrite),
+        progress("read", size_of(result) or None) as advance,
+    ):
+        made = written_report([result], output, reference, aligned=align, progress=advance)
+    _tell(made, output, as_json=json)
+    if made.losses:
+        raise typer.Exit(PARTIAL)
+
+
+def _tell(made: "WrittenReport", output: Location, *, as_json: bool) -> None:
+    if as_json:
+        say_json("report", {"output": str(output), **made.document})
+    else:
+        named = f"{', '.join(made.names[:3])}{' and more' if len(made.names) > 3 else ''}"
+        say(f"{output}: {made.kind} of {named}, {len(made.page.content) / 1e6:.1f} MB")
+        for line in made.page.thinned:
+            say(line)
+    for loss in made.losses:
+        warn(f"warning: {loss}")

@@ -1,0 +1,135 @@
+"""What a page says of a result in words: the verdict, what the log is, what is missing and what to run."""
+
+from collections.abc import Sequence
+
+from mcap_landmarks.channels import DETECTIONS, MATCH, SCAN_OBJECTS, SCENE_OBJECTS
+from mcap_landmarks.messages.match import Status
+from mcap_landmarks.moments import moment
+from mcap_landmarks.report.page.bundle_table import WORDS
+from mcap_landmarks.report.page.paged_result import PagedResult
+from mcap_landmarks.wording import counted
+
+TIMINGS = (
+    "How long the stages took is not known: a result holds no times of the clock, so that the same input gives the "
+    "same bytes. A run shows its progress while it lasts."
+)
+_FIT = 0.1
+"""Errors that one rigid move makes so much smaller are mostly of the map's frame."""
+
+
+def verdict(result: PagedResult) -> str:
+    """What came of the run in two or three sentences."""
+    return " ".join([*_counted(result), *_measured(result)])
+
+
+def _counted(result: PagedResult) -> list[str]:
+    figures, statuses = result.evaluation, result.evaluation["statuses"]
+    count, landmarks = len(result.bundles), result.drawing.landmarks
+    if statuses is not None:
+        whole, localized = sum(statuses.values()), statuses["localized"]
+        names = zip(list(Status)[1:], WORDS[1:], strict=False)
+        failed = [
+            f"{statuses[status.name.lower()]} {words}" for status, words in names if statuses[status.name.lower()]
+        ]
+        said = [f"{localized} of {counted(whole, 'bundle')} were localized ({share(localized, whole)})."]
+        return [*said, f"The others: {', '.join(failed)}."] if failed else said
+    if result.run.continuous and len(result.run.trajectory):
+        made = "" if landmarks is None else f"a map of {counted(len(landmarks), 'landmark')} and "
+        return [f"The run made {made}the path of {counted(len(result.run.trajectory), 'bundle')}."]
+    if figures["localized"]:
+        return [f"{counted(figures['localized'], 'position')} were computed."]
+    if not count and landmarks is not None:
+        classes = len(set(landmarks.classes))
+        plural = "class" if classes == 1 else "classes"
+        return [f"A map of {counted(len(landmarks), 'landmark')} of {classes} {plural}."]
+    made = {DETECTIONS: "detections", SCAN_OBJECTS: "clusters", SCENE_OBJECTS: "objects"}.get(
+        result.bundles.stage, "results"
+    )
+    return [f"{counted(count, 'bundle')} with {made}; none of them is localized yet."]
+
+
+def _measured(result: PagedResult) -> list[str]:
+    figures = result.evaluation
+    position, false = figures["position"], figures["false"]["count"] or 0
+    if not figures["scored"] or position["rmse_m"] is None:
+        return []
+    fit = " after one rigid fit" if figures["alignment"] else ""
+    off = f"{metres(position['rmse_m'])} (RMSE), {metres(position['max_m'])} at most"
+    said = f"Against the truth{fit} they are off by {off}."
+    if not false:
+        return [said, "None is false."]
+    return [said, f"{round(false)} of {figures['scored']} are false: over 1 m or 20 degrees off."]
+
+
+def about(result: PagedResult) -> str:
+    """When the log was, how long, and with which program."""
+    table, parts = result.bundles, []
+    if len(table):
+        start_ns, end_ns = int(table.stamps_ns[0]), int(table.stamps_ns[-1])
+        parts += [f"{moment(start_ns)[:19]}Z", f"{duration((end_ns - start_ns) / 1e9)} from first to last bundle"]
+    landmarks = result.drawing.landmarks
+    if landmarks is not None:
+        parts.append(f"map of {counted(len(landmarks), 'landmark')}")
+    if result.detector is not None:
+        parts.append(f"{counted(result.detector.images, 'image')} looked at")
+    return " · ".join(parts)
+
+
+def missing(result: PagedResult, losses: Sequence[str] = ()) -> list[str]:
+    """A sentence for each thing that the page cannot show, with what to run."""
+    name, said = result.path.name, [f"Not all of the file could be read: {loss}." for loss in losses]
+    if not result.has_truth:
+        said.append(
+            f"There is no truth in {name}, so no error is measured; name a log or trajectory that has it with "
+            "--reference."
+        )
+    elif not result.evaluation["scored"] and len(result.run.trajectory):
+        said.append("No pose has a truth near enough in time, so no error is measured.")
+    if not result.is_log:
+        said.append("This file has no bundles to look at one by one: report the log with results to see them.")
+        return said
+    if not result.has_images:
+        said.append(f"{name} holds no images, so bundles show none: run the verb again without --results-only.")
+    if result.detector is None:
+        said.append(f"{name} holds no detections; mcap-landmarks detect writes them.")
+    if result.bundles.stage is not MATCH and not result.run.continuous:
+        said.append(f"No bundle was matched: mcap-landmarks localize {name} --map MAP.db -o OUT.mcap does that.")
+    if result.drawing.landmarks is None:
+        said.append("There is no map in the log, so no landmarks are drawn: localize and map write theirs.")
+    return [*said, *_frame(result)]
+
+
+def _frame(result: PagedResult) -> list[str]:
+    """Where the map's frame is not the truth's: what is large is one rigid move."""
+    drawn, figures = result.drawn, result.evaluation
+    if drawn is None or figures["alignment"] is not None or (figures["position"]["rmse_m"] or 0.0) < 1.0:
+        return []
+    return [
+        "If the map was not made in the truth's frame, errors are mostly of that: --align moves one onto the other."
+    ]
+
+
+def share(part: int, whole: int) -> str:
+    """A share in percent; only what is whole is 100 %."""
+    if not whole:
+        return "–"
+    percent = 100 * part / whole
+    return f"{percent:.0f} %" if part in {0, whole} else f"{min(max(percent, 0.1), 99.9):.1f} %"
+
+
+def metres(value: float | None) -> str:
+    """A length as it reads best."""
+    if value is None:
+        return "–"
+    if abs(value) < 0.1:
+        return f"{1000 * value:.1f} mm"
+    return f"{value:.2f} m"
+
+
+def duration(seconds: float) -> str:
+    """A time span as it reads best."""
+    whole = round(seconds)
+    if whole < 120:
+        return f"{seconds:.1f} s"
+    hours, minutes = divmod(whole // 60, 60)
+    return f"{hours} h {minutes} min" if hours else f"{minutes} min {whole % 60} s"
