@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mcap_landmarks.channels import MAP, POSE, TRUTH_OBJECTS
 from mcap_landmarks.cli.console import DONE, USAGE, run_command
-from mcap_landmarks.cli.diff import DIFFERENT
+from mcap_landmarks.cli.diff_text import DIFFERENT
 from mcap_landmarks.cli.main import build
 from mcap_landmarks.diff.maps import moved
 from mcap_landmarks.maps.database import write_map

@@ -22,7 +22,8 @@ LINES = {
     "convert": "convert {inputs} -o {output} --config {config_file} --definitions {definitions}",
     "demo": "demo -o {output}",
     "detect": "detect {logs} -o {output} --model {model} --names {names} --config {config_file}",
-    "diff": "diff {baseline} {candidate} --reference {reference}",
+    "diff": "diff {baseline} {candidate} --reference {reference} --criteria {criteria} --baseline {blessed} "
+    "--junit {junit} --markdown {markdown}",
     "evaluate": "evaluate {result} --reference {reference} --tum {tum} --thesis {thesis}",
     "explain": "explain {result} --at 1 -o {output}",
     "export": "export {result} --format tum -o {output}",
@@ -91,6 +92,10 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
         "definitions": folder / "State.msg",
         "tum": folder / "new.tum",
         "thesis": folder / "new.txt",
+        "criteria": folder / "config.toml",
+        "blessed": folder,
+        "junit": folder / "new.xml",
+        "markdown": folder / "new.md",
     }
 
 

@@ -13,7 +13,18 @@ from mcap_landmarks.cli.console import heeding_signals, run_command
 from mcap_landmarks.cli.option_groups import spread
 from mcap_landmarks.errors import UsageError
 
-_NOT_VERBS = {"__init__", "main", "console", "option_groups", "options", "stage_runs", "conversion_options"}
+_NOT_VERBS = {
+    "__init__",
+    "main",
+    "console",
+    "option_groups",
+    "options",
+    "stage_runs",
+    "conversion_options",
+    "diff_options",
+    "diff_text",
+    "diff_sets",
+}
 _READ_NO_LOGS = {"batch", "config", "demo", "generate", "models", "teleop"}
 """Verbs that take no bound on what files may claim; `batch` passes it on."""
 _COMPLETION = "_MCAP_LANDMARKS_COMPLETE"

@@ -13,15 +13,15 @@ from mcap_landmarks.maps.map_message import scene_from_map
 from mcap_landmarks.maps.model import LandmarkMap, MapSource
 from mcap_landmarks.messages.match import Status
 
-_PAIRING = partial(interpolated, max_gap_ns=500_000_000)  # as evaluate's
+PAIRING = partial(interpolated, max_gap_ns=500_000_000)  # as evaluate's
 
 
 def metric_names() -> list[str]:
     """Every figure that there can be, by its dotted name."""
     nothing = scene_from_map(LandmarkMap.surveyed((), (), [], MapSource("reference", "none")), 0)
     statuses = {status.name.lower(): 0 for status in Status}
-    document = evaluate(RunResult(NOWHERE, 0, 0, statuses, nothing), Reference(NOWHERE, nothing), _PAIRING)
-    return [name for name in _flat(document) if name != "alignment"]
+    document = evaluate(RunResult(NOWHERE, 0, 0, statuses, nothing), Reference(NOWHERE, nothing), PAIRING)
+    return [name for name in flat(document) if name != "alignment"]
 
 
 def metric_rows(
@@ -46,7 +46,7 @@ def metric_rows(
     losses += [f"{baseline}: {loss}" for loss in lost] + [f"{candidate}: {loss}" for loss in more]
     if any(side.trajectory is None and side.objects is None for side in (truth, other)):
         return {}, losses
-    return _side_by_side(_flat(evaluate(mine, truth, _PAIRING)), _flat(evaluate(theirs, other, _PAIRING))), losses
+    return _side_by_side(flat(evaluate(mine, truth, PAIRING)), flat(evaluate(theirs, other, PAIRING))), losses
 
 
 def _side_by_side(
@@ -62,11 +62,12 @@ def _side_by_side(
     return rows
 
 
-def _flat(document: Mapping[str, object], prefix: str = "") -> dict[str, float | None]:
+def flat(document: Mapping[str, object], prefix: str = "") -> dict[str, float | None]:
+    """The figures of a document by dotted name."""
     found: dict[str, float | None] = {}
     for key, value in document.items():
         if isinstance(value, Mapping):
-            found.update(_flat(value, f"{prefix}{key}."))
+            found.update(flat(value, f"{prefix}{key}."))
         elif value is None or isinstance(value, int | float):
             found[prefix + key] = value
     return found

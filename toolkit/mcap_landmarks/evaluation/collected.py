@@ -47,6 +47,7 @@ class Collected:
     covariances: list[tuple[Indices, Array]] = field(default_factory=list)
     seen: dict[int, tuple[str, ...]] = field(default_factory=dict)
     statuses: Counter[Status] = field(default_factory=Counter)
+    residuals: list[Array] = field(default_factory=list)
     eligible: int | None = None
     scenes: int = 0
     once: dict[str, SceneObjects] = field(default_factory=dict)
@@ -100,7 +101,10 @@ class Collected:
         trajectory = _trajectory(made, [] if continuous else self.covariances)
         landmarks, drawn = self.once.get(MAP.topic), self.once.get(MAP_MARKERS.topic)
         bundles = matches or self.scenes
-        return RunResult(trajectory, bundles, self.eligible, statuses, landmarks, self.seen, continuous, drawn)
+        residuals = np.concatenate([np.zeros(0), *self.residuals])
+        return RunResult(
+            trajectory, bundles, self.eligible, statuses, landmarks, self.seen, continuous, drawn, residuals
+        )
 
     def reference(self) -> Reference:
         """The truth that the recording holds."""
@@ -133,6 +137,7 @@ class Collected:
         known = {status.value: status for status in Status}
         ids, start = table.columns["landmark_ids"], 0
         counts = np.zeros(len(times), dtype=np.int64) if ids.counts is None else ids.counts
+        self.residuals.append(table.columns["residual_m"].values[:, 0])
         names = [name.decode(errors="replace") for name in ids.values[:, 0].tolist()]
         numbers = table.columns["status"].values[:, 0].tolist()
         for time_ns, number, count in zip(times.tolist(), numbers, counts.tolist(), strict=True):

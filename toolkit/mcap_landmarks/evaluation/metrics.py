@@ -33,7 +33,8 @@ class RunResult:
 
     eligible: how many of the bundles hold two distinct objects or more. seen: ids of the matched landmarks by time.
     continuous: whether the poses are one path rather than each of its own. drawn: the landmarks as markers show them,
-    where a map was made of the log: they have no covariances, and tentative ones are not among them.
+    where a map was made of the log: they have no covariances, and tentative ones are not among them. residuals_m (K,):
+    how far matched objects lie from their landmarks.
     """
 
     trajectory: Trajectory
@@ -44,6 +45,7 @@ class RunResult:
     seen: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
     continuous: bool = False
     drawn: SceneObjects | None = None
+    residuals_m: Array = field(default_factory=lambda: np.zeros(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

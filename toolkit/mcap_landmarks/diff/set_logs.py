@@ -1,0 +1,126 @@
+"""The logs of a set of runs: what a folder holds, what was blessed of one, and the truth that others have for them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap_landmarks.diff.blessed import BLESSED, BlessedLog, read_blessed
+from mcap_landmarks.diff.log_figures import ReadLog, log_figures, read_log
+from mcap_landmarks.diff.paired_logs import pair_logs
+from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
+from mcap_landmarks.evaluation.metrics import Reference
+from mcap_landmarks.evaluation.read import read_reference
+from mcap_landmarks.locations import Location, to_read
+from mcap_landmarks.progress import Progress
+from mcap_landmarks.recording.reader import open_recording
+
+_SUFFIX = ".mcap"
+
+
+@dataclass(frozen=True, slots=True)
+class SetLog:
+    """A log of a set: a file, or what was blessed of one; `error` says why it cannot be read."""
+
+    name: str
+    path: Path | None = None
+    fingerprint: str | None = None
+    blessed: BlessedLog | None = None
+    error: str | None = None
+
+
+def logs_in(folder: Location) -> list[SetLog]:
+    """The logs of a folder by name, those in its folders too; where it has blessed results, these.
+
+    Raises:
+        ToolkitError: there are none, or the blessed ones cannot be read.
+    """
+    place = to_read(folder)
+    if (place / BLESSED).exists():
+        return [SetLog(log.name, fingerprint=log.fingerprint, blessed=log) for log in read_blessed(place / BLESSED)]
+    paths = sorted(path for path in place.rglob(f"*{_SUFFIX}") if path.is_file() and not path.name.startswith("."))
+    if not paths:
+        raise UsageError(f"{folder}: holds neither logs (*{_SUFFIX}) nor {BLESSED}; name a folder of results")
+    return [_listed(path, path.relative_to(place).with_suffix("").as_posix()) for path in paths]
+
+
+def _listed(path: Path, name: str) -> SetLog:
+    try:
+        with open_recording(path) as recording:
+            return SetLog(name, path, recording.fingerprint())
+    except ToolkitError as error:
+        return SetLog(name, path, error=str(error))
+
+
+def read_whole(log: SetLog, progress: Progress | None = None) -> ReadLog | BlessedLog:
+    """What a log holds.
+
+    Raises:
+        ToolkitError: it has no results, or cannot be read to its end: figures of a part are not those of the whole.
+    """
+    if log.blessed is not None:
+        return log.blessed
+    if log.path is None or log.error is not None:
+        raise RecordingError(log.error or f"{log.name}: cannot be read")
+    found = read_log(log.path, progress)
+    if found.losses:
+        raise RecordingError(f"{log.path}: {'; '.join(found.losses)}")
+    return found
+
+
+class Truths:
+    """The truth that `reference` has, in a file for all logs or in a folder of logs; of nothing without one."""
+
+    def __init__(self, reference: Location | None) -> None:
+        self._known: Reference | None = Reference()
+        self._logs: list[SetLog] = []
+        if reference is not None and to_read(reference).is_dir():
+            self._logs = logs_in(reference)
+        elif reference is not None:
+            self._known, losses = read_reference(reference)
+            if losses:
+                raise RecordingError(f"{reference}: {'; '.join(losses)}")
+
+    def of(self, log: SetLog) -> Reference:
+        """The truth for a log.
+
+        Raises:
+            ToolkitError: the log that has it cannot be read.
+        """
+        pairs = pair_logs([log], self._logs)
+        found = self._logs[pairs[0].candidate].path if pairs else None
+        if found is None:
+            return self._known or Reference()
+        return read_reference(found)[0]
+
+
+def blessed_logs(folder: Location, reference: Location | None, progress: Progress | None = None) -> list[BlessedLog]:
+    """What can be blessed of a folder of results: all of it.
+
+    Raises:
+        ToolkitError: a log cannot be read whole, or has no results.
+    """
+    truths, found = Truths(reference), []
+    for log in logs_in(folder):
+        read = read_whole(log, progress)
+        if isinstance(read, ReadLog):
+            figures = log_figures(read, read.truth.over(truths.of(log)))
+            read = BlessedLog(log.name, log.fingerprint, read.manifest, figures)
+        found.append(read)
+    return found
+
+
+def figures_of(
+    logs: Sequence[SetLog], read: Sequence[ReadLog | BlessedLog], truths: Truths
+) -> list[dict[str, float | None]]:
+    """The figures of a pair of logs; if they are of one recording, each has the other's truth where it lacks its own.
+
+    Raises:
+        ToolkitError: the truth of `truths` cannot be read.
+    """
+    own = [one.truth if isinstance(one, ReadLog) else Reference() for one in read]
+    if logs[0].fingerprint == logs[1].fingerprint:
+        own = [own[0].over(own[1]), own[1].over(own[0])]
+    return [
+        log_figures(one, truth.over(truths.of(log))) if isinstance(one, ReadLog) else dict(one.figures)
+        for log, one, truth in zip(logs, read, own, strict=True)
+    ]
