@@ -21,11 +21,11 @@ def one(paths: Path | list[Path], output: Path, selection: Selection | None = No
     return done
 
 
-def doctor(path: Path) -> list[str]:
-    """Errors that pymcap-cli's doctor finds."""
+def doctor(path: Path, *severities: Severity) -> list[str]:
+    """What pymcap-cli's doctor finds of some severities, by default errors."""
     with path.open("rb") as stream:
         report = examine_mcap(stream, path.stat().st_size, str(path))
-    return [str(finding) for finding in report.findings if finding.severity is Severity.ERROR]
+    return [str(finding) for finding in report.findings if finding.severity in (severities or (Severity.ERROR,))]
 
 
 def stored(path: Path) -> Counter[tuple[str, int, bytes]]:

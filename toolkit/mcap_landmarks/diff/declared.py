@@ -11,7 +11,9 @@ from mcap_landmarks.diff.logs import Connections, shared_layout
 from mcap_landmarks.manifest import RUN
 from mcap_landmarks.recording.reader import Recording
 
-_FOLLOWS = re.compile(r"content|carried(\..*)?|options\.logs|stages\.[^.]*\.(key|outcome|inputs|resources|code)(\..*)?")
+_FOLLOWS = re.compile(
+    r"content|(carried|shared)(\..*)?|options\.logs|stages\.[^.]*\.(key|outcome|inputs|resources|code)(\..*)?"
+)
 
 
 def manifest_rows(baseline: Mapping[str, str], candidate: Mapping[str, str]) -> list[ManifestRow]:

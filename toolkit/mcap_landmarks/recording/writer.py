@@ -18,14 +18,13 @@ from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import CONTENT, RUN, STAGE, entry_text
 from mcap_landmarks.messages.codec import Message, encode
 from mcap_landmarks.messages.images import CompressedImage, Image
-from mcap_landmarks.messages.qos import KEY, qos_profile
-from mcap_landmarks.messages.typestore import definition
 from mcap_landmarks.messages.video import CompressedVideo, TheoraPacket
 from mcap_landmarks.recording.checksum import crc32, crc32_after
 from mcap_landmarks.recording.chunk_copy import WholeChunk, compressed
 from mcap_landmarks.recording.chunk_form import CHUNK_NS, ChunkForm, OpenChunk
 from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, serialize
 from mcap_landmarks.recording.declared_channels import Declared
+from mcap_landmarks.recording.shared_channels import result_connection
 from mcap_landmarks.recording.summary import attachment_index, summary_section
 from mcap_landmarks.recording.summary_index import MetadataRecord
 from mcap_landmarks.stage import Channel, Connection, RawMessage, Stamped
@@ -168,11 +167,8 @@ class RecordingWriter:
     def connection(self, channel: Channel[Message], stage: str = "") -> Connection:
         """The connection that messages of a channel of ours go to; that of results names their stage."""
         if (channel.topic, stage) not in self._own:
-            ros_type = channel.message.ROS_TYPE
-            metadata = {KEY: qos_profile(latched=channel.topic in _LATCHED)} | ({STAGE: stage} if stage else {})
-            self._own[channel.topic, stage] = Connection(
-                channel.topic, ros_type, definition(ros_type).encode(), metadata=metadata
-            )
+            latched, ros_type = channel.topic in _LATCHED, channel.message.ROS_TYPE
+            self._own[channel.topic, stage] = result_connection(channel.topic, ros_type, stage, latched=latched)
         return self._own[channel.topic, stage]
 
     def attach(self, attachment: records.Attachment) -> None:

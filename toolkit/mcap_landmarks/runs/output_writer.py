@@ -1,17 +1,19 @@
 """The output of a run: a log's own messages with the results of all stages, each stage's in chunks of its own."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from operator import itemgetter
 from pathlib import Path
 
+from mcap_landmarks.channels import SHARED
 from mcap_landmarks.manifest import (
     CARRIED,
     CONTENT,
     LOSSES,
     RUN,
+    SHARED_CHANNELS,
     STAGE,
     Manifest,
     entry_text,
@@ -25,6 +27,7 @@ from mcap_landmarks.recording.chunk_copy import WholeChunk
 from mcap_landmarks.recording.latched import carried_note, latched, latest
 from mcap_landmarks.recording.layered_log import Layer, LayeredLog, own_layer
 from mcap_landmarks.recording.reader import Recording
+from mcap_landmarks.recording.shared_channels import SharedTransforms, can_share
 from mcap_landmarks.recording.summary_index import MetadataRecord
 from mcap_landmarks.recording.writer import RecordingWriter, create_recording, profile_of
 from mcap_landmarks.runs.bag_record import bag_of
@@ -32,6 +35,9 @@ from mcap_landmarks.runs.rosbag2_metadata import RECORD, record_of
 from mcap_landmarks.runs.session import Session
 from mcap_landmarks.sources import recorded_metadata
 from mcap_landmarks.stage import Connection, RawMessage
+
+_OF_THE_CONTENT = frozenset({CONTENT, LOSSES, CARRIED, SHARED_CHANNELS})
+"""Entries of the manifest that tell of what was written, not of what was asked for."""
 
 
 def write_output(
@@ -67,7 +73,7 @@ def write_output(
     if not request.force and earlier is not None and _is_there(earlier, entries, own, results, source):
         losses, carried = [*source.losses, *told_losses(earlier.metadata)], told_carried(earlier.metadata)
     else:
-        losses, carried = _write(session, output, entries, [own, *results], watch)
+        losses, carried = _write(session, output, entries, [own, *_shared_last(results)], watch)
     return [*notes, *([carried_note(carried)] if carried else [])], losses
 
 
@@ -85,20 +91,34 @@ def _write(
         create_recording(output, {RUN: entries}, profile=profile, carried=records) as writer,
         watch(f"write {output.name}", size) as progress,
     ):
-        clean, kept = _declare(writer, layers[0])
+        clean, kept = _declare(writer, layers[0], joined := _joined(layers))
         pieces = view.pieces(kept, writer.declared(), span.start_ns, span.end_ns, progress)
-        for piece in chain(carried, pieces):
-            if isinstance(piece, WholeChunk):
-                writer.copy(piece)
-            else:
-                connection = clean.get(piece.connection)
-                writer.write(piece if connection is None else piece._replace(connection=connection))
+        shared = _put(writer, chain(carried, pieces), clean, joined)
         for attachment in () if session.request.results_only else source.attachments():
             writer.attach(attachment)
         _renew(writer, source)
-        told = {LOSSES: source.losses, CARRIED: counts}
+        told = {LOSSES: source.losses, CARRIED: counts, SHARED_CHANNELS: shared}
         writer.metadata[RUN].update({name: entry_text(value) for name, value in told.items() if value})
     return list(source.losses), counts
+
+
+def _put(
+    writer: RecordingWriter,
+    pieces: Iterable[RawMessage | WholeChunk],
+    clean: Mapping[Connection, Connection],
+    joined: Collection[Connection],
+) -> dict[str, dict[str, object]]:
+    """Write all pieces; for the manifest, the results by stage that went to a channel of the log's own."""
+    shared = {result: SharedTransforms(writer.declared().ids[clean[result]]) for result in joined}
+    for piece in pieces:
+        if isinstance(piece, WholeChunk):
+            writer.copy(piece)
+            continue
+        if piece.connection in shared:
+            shared[piece.connection].add(piece)
+        connection = clean.get(piece.connection)
+        writer.write(piece if connection is None else piece._replace(connection=connection))
+    return {result.metadata[STAGE]: one.entry() for result, one in shared.items() if one.count}
 
 
 def _renew(writer: RecordingWriter, source: Recording) -> None:
@@ -119,23 +139,50 @@ def _own(session: Session, results: Sequence[Layer]) -> Layer:
     return replace(own, channels=()) if session.request.results_only else own
 
 
-def _declare(writer: RecordingWriter, own: Layer) -> tuple[dict[Connection, Connection], list[Connection]]:
+def _shared_last(results: Sequence[Layer]) -> list[Layer]:
+    """Results with those on shared topics behind all others of equal time, wherever they lie now."""
+    shared = [
+        replace(layer, channels=tuple(entry for entry in layer.channels if entry.connection.topic in SHARED))
+        for layer in results
+    ]
+    others = [
+        replace(layer, channels=tuple(entry for entry in layer.channels if entry.connection.topic not in SHARED))
+        for layer in results
+    ]
+    return [layer for layer in (*others, *shared) if layer.channels]
+
+
+def _joined(layers: Sequence[Layer]) -> dict[Connection, Connection]:
+    """The connections of results that go to a channel of the log's own, with that: a topic has one channel."""
+    own, found = layers[0], {}
+    for entry in (entry for layer in layers[1:] for entry in layer.channels):
+        fitting = (one.connection for one in own.channels if can_share(one.connection, entry.connection))
+        first = next(fitting, None)
+        if first is not None:
+            found[entry.connection] = first
+    return found
+
+
+def _declare(
+    writer: RecordingWriter, own: Layer, joined: Mapping[Connection, Connection]
+) -> tuple[dict[Connection, Connection], list[Connection]]:
     """Declare a log's own channels with the ids that they have there; the changed ones, and those that have their ids.
 
     Those that look like results, in a file that was edited, lose that look. Results come after them, in chunks of their
-    own, whether they are new or lay in the log: the same results give the same bytes.
+    own, whether they are new or lay in the log: the same results give the same bytes. Those that are `joined` with a
+    channel go in between its messages, whose chunks are written anew for that.
     """
-    clean, kept = {}, []
+    clean, kept, anew = {}, [], {*joined.values(), *own.parts}
     for entry in own.channels:
         connection = entry.connection
         if STAGE in connection.metadata:
             metadata = {name: text for name, text in connection.metadata.items() if name != STAGE}
             clean[connection] = replace(connection, metadata=metadata)
-        if writer.keep(clean.get(connection, connection), *own.recording.ids(connection)):
-            kept.append(connection)
-        else:
+        if not writer.keep(clean.get(connection, connection), *own.recording.ids(connection)):
             writer.declare(clean.get(connection, connection))
-    return clean, kept
+        elif connection not in anew:
+            kept.append(connection)
+    return clean | {result: clean.get(one, one) for result, one in joined.items()}, kept
 
 
 def _is_there(
@@ -146,7 +193,7 @@ def _is_there(
     source: Recording,
 ) -> bool:
     """Whether an earlier output holds all that would be written."""
-    own_entries = {k: v for k, v in earlier.metadata.get(RUN, {}).items() if k not in {CONTENT, LOSSES, CARRIED}}
+    own_entries = {k: v for k, v in earlier.metadata.get(RUN, {}).items() if k not in _OF_THE_CONTENT}
     return (
         earlier.is_ours
         and own_entries == entries
