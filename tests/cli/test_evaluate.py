@@ -48,6 +48,20 @@ def test_the_document_fits_its_schema(log: Path, tmp_path: Path, capsys: pytest.
     assert document(capsys, tmp_path / "map.db", "--reference", log)["map"]["landmarks"] == 3
 
 
+def test_poses_in_a_frame_of_their_own_are_told_how_to_be_measured(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    truth = tmp_path / "elsewhere.tum"
+    seconds = START_NS // 10**9
+    truth.write_text(
+        "".join(f"{seconds + tenths / 10:.3f} 40 {tenths / 100} 0 0 0 0 1\n" for tenths in range(-20, 200))
+    )
+    assert run(log, "--reference", truth) == DONE
+    assert "--align moves them onto the truth" in capsys.readouterr().err
+    assert run(log) == DONE
+    assert "--align" not in capsys.readouterr().err
+
+
 def test_the_table_tells_units_and_cases(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(log, "--align") == DONE
     out = capsys.readouterr().out

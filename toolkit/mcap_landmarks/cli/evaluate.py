@@ -59,6 +59,7 @@ def command(
 
     The truth is RESULT's own /ground_truth channels, or those of --reference.
     """
+    from mcap_landmarks.evaluation.metrics import frame_note
     from mcap_landmarks.evaluation.read import read_reference, read_run
     from mcap_landmarks.runs.replacing import new_files
 
@@ -74,6 +75,8 @@ def command(
         _export(run, truth, pairing, tum, thesis)
     if document["localized"] and not document["scored"] and truth.trajectory is not None:
         warn(f"note: {result}: no pose has a truth near enough in time; see --max-gap and --association")
+    if note := frame_note(document["position"], aligned=align):
+        warn(f"note: {result}: {note}")
     if json:
         say_json("evaluate", document)
     else:

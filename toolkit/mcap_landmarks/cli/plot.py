@@ -40,6 +40,8 @@ def command(
 ) -> None:
     """Plot INPUT... into one picture (.png, .svg, .pdf): landmarks by class, paths, positions and their errors."""
     from mcap_landmarks.atomic import atomic_file
+    from mcap_landmarks.evaluation.metrics import frame_note
+    from mcap_landmarks.evaluation.pose_metrics import pose_errors, position_figures
     from mcap_landmarks.report.drawing import gather
     from mcap_landmarks.report.error_plots import errors_figure, positions_figure
     from mcap_landmarks.report.plots import figure, form_of, save
@@ -52,6 +54,10 @@ def command(
         draw = {Show.MAP: figure, Show.POSITIONS: positions_figure, Show.ERRORS: errors_figure}[show]
         with atomic_file(output) as stream:
             save(partial(draw, drawing, title), stream, form, picture_mark("plot", inputs))
+    for run in drawing.runs:
+        errors = pose_errors(run.scored.estimate, run.scored.reference)
+        if note := frame_note(position_figures(errors), aligned=align):
+            warn(f"note: {run.name}: {note}")
     for loss in losses:
         warn(f"warning: {loss}")
     if losses:

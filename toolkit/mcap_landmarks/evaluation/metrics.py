@@ -88,6 +88,14 @@ def score(estimate: Trajectory, reference: Reference, pairing: Pairing, *, align
     return ScoredPoses(rows, poses, covariances, truth, alignment)
 
 
+def frame_note(position: Figures, *, aligned: bool) -> str | None:
+    """What to say where most poses lie in another frame than the truth, as those in a map of one's own do."""
+    median_m = position["median_m"]
+    if aligned or median_m is None or median_m <= 1:
+        return None
+    return "most poses are over 1 m off; where the map has a frame of its own, --align moves them onto the truth"
+
+
 class Evaluation(TypedDict):
     """The document of `evaluate --json`, as schemas/json/evaluate.schema.json describes it."""
 
