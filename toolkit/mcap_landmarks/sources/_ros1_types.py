@@ -89,15 +89,14 @@ def _source(name: str, text: str, md5sum: str, files: DefinitionFiles) -> tuple[
     Raises:
         MessageError: it lacks what nobody defines, or is empty and was another one than that which is known.
     """
-    standard = standard_ros1().fielddefs
+    source = get_typestore(Stores.EMPTY)  # it has times and durations, which every ROS has
 
     def known(one: str) -> MessageFields | None:
-        return files.fields(one) or standard.get(one)
+        return files.fields(one) or source.fielddefs.get(one) or standard_ros1().fielddefs.get(one)
 
     empty = is_empty(text) and md5sum != _MD5_OF_NOTHING and (known(name) is not None or bool(md5sum))
     given = {} if empty else get_types_from_msg(plain(text), name)
     types = needed_by(name, lambda one: given.get(one) or known(one))
-    source = get_typestore(Stores.EMPTY)
     source.register(types)
     is_sure = types.keys() <= given.keys() or source.generate_msgdef(name, ros_version=1)[1] == md5sum
     if empty and not is_sure and _MD5.fullmatch(md5sum):
@@ -107,7 +106,7 @@ def _source(name: str, text: str, md5sum: str, files: DefinitionFiles) -> tuple[
 
 @cache
 def standard_ros1() -> Typestore:
-    """ROS 1's own types."""
+    """ROS 1's own types; to load them takes as long as to convert 10 MB, and bags seldom need them."""
     return get_typestore(Stores.ROS1_NOETIC)
 
 
