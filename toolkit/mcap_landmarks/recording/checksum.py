@@ -1,6 +1,6 @@
 """The CRC-32 of chunks and files."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 _combine: Callable[[int, int, int], int] | None = None
 try:
@@ -21,9 +21,13 @@ def crc32(data: bytes | bytearray | memoryview, before: int = 0) -> int:
     return int(_crc32(data, before))
 
 
-def crc32_after(data: bytes | bytearray | memoryview, own: int, before: int) -> int:
-    """The CRC-32 of bytes with the CRC `own` that follow others with the CRC `before`.
+def crc32_after(pieces: Iterable[bytes | bytearray | memoryview], own: int, before: int) -> int:
+    """The CRC-32 of bytes with the CRC `own`, in pieces, that follow others with the CRC `before`.
 
     The bytes are not read again, unless zlib-ng is missing, which knows how to join two CRCs.
     """
-    return int(_crc32(data, before) if _combine is None else _combine(before, own, len(data)))
+    if _combine is not None:
+        return int(_combine(before, own, sum(map(len, pieces))))
+    for piece in pieces:
+        before = int(_crc32(piece, before))
+    return before

@@ -22,12 +22,30 @@ class ChunkForm:
         return self.compression != "none" and (self.is_for_images or not is_image)
 
 
+Buffer = bytes | bytearray | memoryview
+LARGE_BYTES = 1 << 14
+"""Payloads from this size on stay where they are, if nothing else lies there: to copy them would take longer."""
+
+
 @dataclass(slots=True)
 class OpenChunk:
-    """Messages on their way into one chunk of the file."""
+    """Messages on their way into one chunk of the file: `size` bytes, in `large` pieces and those in `data` behind."""
 
     compressed: bool
     data: bytearray = field(default_factory=bytearray)
+    large: list[Buffer] = field(default_factory=list)
+    size: int = 0
     start_ns: int = 2**64 - 1
     end_ns: int = 0
     index: "defaultdict[int, array[int]]" = field(default_factory=lambda: defaultdict(lambda: array("Q")))
+
+    def take(self, head: bytes, payload: bytes) -> None:
+        """Add a message with a large payload."""
+        self.data += head
+        self.large += (self.data, payload)
+        self.data = bytearray()
+
+    @property
+    def pieces(self) -> list[Buffer]:
+        """All that is in it."""
+        return [*self.large, self.data] if self.data or not self.large else self.large

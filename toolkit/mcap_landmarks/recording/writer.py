@@ -1,16 +1,11 @@
 """Write recordings: chunked, indexed, checksummed, and whole or not at all."""
 
 import contextlib
-import hashlib
-import sys
 from collections.abc import Iterable, Iterator, Mapping
 from operator import itemgetter
-from struct import Struct
 from typing import BinaryIO
 
-import lz4.frame
 from mcap import records
-from zstandard import ZstdCompressor
 
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.channels import MAP, MAP_MARKERS, MAP_PATH, TF_STATIC, TRUTH_OBJECTS
@@ -19,10 +14,10 @@ from mcap_landmarks.manifest import CONTENT, RUN, STAGE, entry_text
 from mcap_landmarks.messages.codec import Message, encode
 from mcap_landmarks.messages.images import CompressedImage, Image
 from mcap_landmarks.messages.video import CompressedVideo, TheoraPacket
-from mcap_landmarks.recording.checksum import crc32, crc32_after
-from mcap_landmarks.recording.chunk_copy import WholeChunk, compressed
-from mcap_landmarks.recording.chunk_form import CHUNK_NS, ChunkForm, OpenChunk
-from mcap_landmarks.recording.container import CHUNK, MAGIC, MESSAGE, MESSAGE_FIXED, RECORD, Opcode, serialize
+from mcap_landmarks.recording.chunk_copy import WholeChunk
+from mcap_landmarks.recording.chunk_form import CHUNK_NS, LARGE_BYTES, ChunkForm, OpenChunk
+from mcap_landmarks.recording.chunk_output import ChunkOutput
+from mcap_landmarks.recording.container import MAGIC, MESSAGE, MESSAGE_FIXED, Opcode, serialize
 from mcap_landmarks.recording.declared_channels import Declared
 from mcap_landmarks.recording.shared_channels import result_connection
 from mcap_landmarks.recording.summary import attachment_index, summary_section
@@ -31,9 +26,6 @@ from mcap_landmarks.stage import Channel, Connection, RawMessage, Stamped
 
 ROS2 = "ros2"
 """The profile of recordings whose messages are all of CDR, each with its definition."""
-_LENGTH, _LENGTH_8 = Struct("<I"), Struct("<Q")
-_INDEX = Struct("<BQHI")  # opcode, length, channel, bytes of the entries
-_MESSAGE_INDEX = Opcode.MESSAGE_INDEX.value
 _MESSAGE = Opcode.MESSAGE.value
 _IMAGE_TYPES = frozenset(message.ROS_TYPE for message in (Image, CompressedImage, CompressedVideo, TheoraPacket))
 _CLOUD_TYPE = "sensor_msgs/msg/PointCloud2"
@@ -73,8 +65,11 @@ def create_recording(
         writer = RecordingWriter(stream, form, profile=profile, carried=carried)
         for name, entries in (metadata or {}).items():
             writer.metadata[name] = dict(entries)
-        yield writer
-        writer.finish()
+        try:
+            yield writer
+            writer.finish()
+        finally:
+            writer.close()
 
 
 class RecordingWriter:
@@ -92,19 +87,15 @@ class RecordingWriter:
         self.metadata: dict[str, dict[str, str]] = {}
         self.counts: dict[str, int] = {}
         self._carried = tuple(carried)
-        self._stream = stream
-        self._offset = self._crc = 0
+        self._stream, self._form = stream, form
+        self._output = ChunkOutput(stream, form)
         self._connections: dict[Connection, tuple[int, str]] = {}
         self._own: dict[tuple[str, str], Connection] = {}
         self._declared = Declared()
         self._message_counts: dict[int, int] = {}
         self._chunks: dict[str, OpenChunk] = {}
-        self._chunk_indexes: list[records.ChunkIndex] = []
         self._attachments: list[records.AttachmentIndex] = []
-        self._content = hashlib.sha256()
-        self._form = form
-        self._compress = lz4.frame.compress if form.compression == "lz4" else ZstdCompressor(level=3).compress
-        self._put(MAGIC + serialize(records.Header(profile=profile, library="mcap-landmarks")))
+        self._output.put(MAGIC + serialize(records.Header(profile=profile, library="mcap-landmarks")))
 
     def declare(self, connection: Connection) -> None:
         """Give a connection its channel, also if no message of it comes."""
@@ -119,7 +110,7 @@ class RecordingWriter:
         return data is not None
 
     def _start(self, connection: Connection, data: bytes) -> None:
-        self._put(data)
+        self._output.put(data)
         channel_id = self._declared.ids[connection]
         self._message_counts[channel_id] = 0
         self.counts.setdefault(connection.topic, 0)
@@ -142,20 +133,25 @@ class RecordingWriter:
             chunk = self._chunks[group] = OpenChunk(
                 compressed=self._form.compresses(is_image=group.startswith("image "))
             )
-        data, entries = chunk.data, chunk.index[channel_id]
+        length, entries = len(payload), chunk.index[channel_id]
         entries.append(time_ns)
-        entries.append(len(data))
-        data += MESSAGE.pack(_MESSAGE, MESSAGE_FIXED + len(payload), channel_id, sequence, time_ns, publish_time_ns)
-        data += payload
+        entries.append(chunk.size)
+        head = MESSAGE.pack(_MESSAGE, MESSAGE_FIXED + length, channel_id, sequence, time_ns, publish_time_ns)
+        if length >= LARGE_BYTES and type(payload) is bytes:
+            chunk.take(head, payload)
+        else:
+            chunk.data += head
+            chunk.data += payload
+        chunk.size += len(head) + length
         chunk.start_ns = min(chunk.start_ns, time_ns)
         chunk.end_ns = max(chunk.end_ns, time_ns)
         self._message_counts[channel_id] += 1
         self.counts[connection.topic] += 1
-        if len(data) >= self._form.size_bytes or chunk.end_ns - chunk.start_ns >= CHUNK_NS:
+        if chunk.size >= self._form.size_bytes or chunk.end_ns - chunk.start_ns >= CHUNK_NS:
             for name in [key for key, other in self._chunks.items() if time_ns - other.start_ns >= CHUNK_NS]:
-                self._flush(self._chunks.pop(name))
+                self._output.chunk(self._chunks.pop(name))
             if group in self._chunks:
-                self._flush(self._chunks.pop(group))
+                self._output.chunk(self._chunks.pop(group))
 
     def add(self, stamped: Stamped, stage: str = "") -> None:
         """Encode a message of ours, a result of `stage` if it is one, and write it; it is published when logged."""
@@ -174,22 +170,22 @@ class RecordingWriter:
     def attach(self, attachment: records.Attachment) -> None:
         """Carry an attachment over from another recording."""
         data = serialize(attachment)
-        self._attachments.append(attachment_index(attachment, self._offset, len(data)))
-        self._put(data)
+        self._attachments.append(attachment_index(attachment, self._output.offset, len(data)))
+        self._output.put(data)
 
     def finish(self) -> None:
         """Write what is left, the metadata and the summary; afterwards the file is complete."""
         for group in sorted(self._chunks, key=lambda name: self._chunks[name].start_ns):
-            self._flush(self._chunks.pop(group))
+            self._output.chunk(self._chunks.pop(group))
         if "fingerprint" in self.metadata.get(RUN, {}):
-            self.metadata[RUN][CONTENT] = entry_text(self._content.hexdigest())
+            self.metadata[RUN][CONTENT] = entry_text(self._output.content_hash)
         metadata_indexes = []
         carried = [record for record in self._carried if record[0] not in self.metadata]
         for name, entries in sorted([*carried, *self.metadata.items()], key=itemgetter(0)):
             data = serialize(records.Metadata(name=name, metadata=dict(sorted(entries.items()))))
-            metadata_indexes.append(records.MetadataIndex(length=len(data), name=name, offset=self._offset))
-            self._put(data)
-        self._put(serialize(records.DataEnd(data_section_crc=self._crc)))
+            metadata_indexes.append(records.MetadataIndex(length=len(data), name=name, offset=self._output.offset))
+            self._output.put(data)
+        self._output.put(serialize(records.DataEnd(data_section_crc=self._output.crc)))
         first_ns, last_ns = self.times_ns() or (0, 0)
         statistics = records.Statistics(
             message_count=sum(self._message_counts.values()),
@@ -197,7 +193,7 @@ class RecordingWriter:
             channel_count=len(self._declared.channels),
             attachment_count=len(self._attachments),
             metadata_count=len(metadata_indexes),
-            chunk_count=len(self._chunk_indexes),
+            chunk_count=len(self._output.chunk_indexes),
             message_start_time=first_ns,
             message_end_time=last_ns,
             channel_message_counts={key: count for key, count in self._message_counts.items() if count},
@@ -206,11 +202,15 @@ class RecordingWriter:
             list(self._declared.schemas.values()),
             list(self._declared.channels.values()),
             [statistics],
-            list(self._chunk_indexes),
+            list(self._output.chunk_indexes),
             list(self._attachments),
             list(metadata_indexes),
         ]
-        self._stream.write(summary_section(groups, self._offset))
+        self._stream.write(summary_section(groups, self._output.offset))
+
+    def close(self) -> None:
+        """End what was begun, whether all of it is written or not."""
+        self._output.close()
 
     def copy(self, chunk: WholeChunk) -> None:
         """Write a chunk of another recording as it is; its channels have the ids that they have there.
@@ -219,11 +219,11 @@ class RecordingWriter:
         """
         for name, other in list(self._chunks.items()):
             if other.index.keys() & chunk.counts.keys() or chunk.log_time_ns - other.start_ns >= CHUNK_NS:
-                self._flush(self._chunks.pop(name))
+                self._output.chunk(self._chunks.pop(name))
         for channel_id, count in chunk.counts.items():
             self._message_counts[channel_id] += count
             self.counts[self._declared.channels[channel_id].topic] += count
-        self._put_chunk(chunk.record, chunk.indexes, chunk.checked_crc)
+        self._output.copy(chunk)
 
     def count(self, connection: Connection) -> int:
         """How many messages of a connection that is declared are written."""
@@ -231,8 +231,8 @@ class RecordingWriter:
 
     def times_ns(self) -> tuple[int, ...]:
         """The first and the last log time of what is written, none if nothing is."""
-        starts = [chunk.message_start_time for chunk in self._chunk_indexes]
-        ends = [chunk.message_end_time for chunk in self._chunk_indexes]
+        starts = [chunk.message_start_time for chunk in self._output.chunk_indexes]
+        ends = [chunk.message_end_time for chunk in self._output.chunk_indexes]
         starts += [chunk.start_ns for chunk in self._chunks.values()]
         ends += [chunk.end_ns for chunk in self._chunks.values()]
         return (min(starts), max(ends)) if starts else ()
@@ -240,52 +240,3 @@ class RecordingWriter:
     def declared(self) -> Declared:
         """The channels and schemas so far."""
         return self._declared
-
-    def _flush(self, chunk: OpenChunk) -> None:
-        content = self._compress(chunk.data) if chunk.compressed else chunk.data
-        compression = self._form.compression.encode() if chunk.compressed else b""
-        crc = crc32(chunk.data)
-        head = CHUNK.pack(chunk.start_ns, chunk.end_ns, len(chunk.data), crc)
-        head += _LENGTH.pack(len(compression)) + compression + _LENGTH_8.pack(len(content))
-        record = b"".join((RECORD.pack(Opcode.CHUNK, len(head) + len(content)), head, content))
-        indexes = {}
-        for channel_id, entries in sorted(chunk.index.items()):
-            if sys.byteorder == "big":
-                entries.byteswap()
-            content = entries.tobytes()
-            indexes[channel_id] = _INDEX.pack(_MESSAGE_INDEX, 6 + len(content), channel_id, len(content)) + content
-        self._put_chunk(record, indexes, None if compression else crc)
-
-    def _put_chunk(self, record: bytes, indexes: Mapping[int, bytes], data_crc: int | None) -> None:
-        """Write the whole record of a chunk, whose data have a CRC if that is known, and its message indexes."""
-        start_ns, end_ns, size, _ = CHUNK.unpack_from(record, RECORD.size)
-        compression, data = compressed(record)
-        start, offsets = self._offset, {}
-        self._content.update(record[RECORD.size : RECORD.size + CHUNK.size])
-        self._put(record, len(data), data_crc)
-        for channel_id, index in indexes.items():
-            offsets[channel_id] = self._offset
-            self._put(index)
-        self._chunk_indexes.append(
-            records.ChunkIndex(
-                chunk_length=len(record),
-                chunk_start_offset=start,
-                compression=compression,
-                compressed_size=len(data),
-                message_end_time=end_ns,
-                message_index_length=self._offset - start - len(record),
-                message_index_offsets=offsets,
-                message_start_time=start_ns,
-                uncompressed_size=size,
-            )
-        )
-
-    def _put(self, data: bytes, tail: int = 0, tail_crc: int | None = None) -> None:
-        """Write some bytes, the last `tail` of which have a CRC that may be known."""
-        self._stream.write(data)
-        self._offset += len(data)
-        if tail_crc is None:
-            self._crc = crc32(data, self._crc)
-        else:
-            head, end = memoryview(data)[: len(data) - tail], memoryview(data)[len(data) - tail :]
-            self._crc = crc32_after(end, tail_crc, crc32(head, self._crc))
