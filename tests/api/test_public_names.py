@@ -13,7 +13,7 @@ TREE = ast.parse(Path(ml.__file__).read_text())
 
 def test_the_names_for_checkers_are_those_that_are_loaded() -> None:
     imported = {alias.name for node in ast.walk(TREE) if isinstance(node, ast.ImportFrom) for alias in node.names}
-    assert imported - {"TYPE_CHECKING", "version"} == set(ml.__all__)
+    assert imported - {"TYPE_CHECKING", "ModuleType", "version"} == set(ml.__all__)
     assert list(ml.__all__) == sorted(ml.__all__, key=lambda name: (not name[0].isupper(), name))
     for name in ml.__all__:
         assert getattr(ml, name) is not None

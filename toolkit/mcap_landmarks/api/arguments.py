@@ -13,7 +13,7 @@ from mcap_landmarks.locations import Location, location
 from mcap_landmarks.moments import time_ns
 
 AnyPath = str | PathLike[str]
-Moment = int | str | datetime | np.datetime64
+Moment = int | np.int64 | str | datetime | np.datetime64
 """Nanoseconds since the epoch, RFC 3339, or a moment; a `datetime` without time zone is refused, NumPy's are in UTC."""
 
 
@@ -32,16 +32,22 @@ def places(paths: AnyPath | Sequence[AnyPath]) -> list[Location]:
     return [place(paths)] if isinstance(paths, str | PathLike) else [place(path) for path in paths]
 
 
-def moment_ns(given: Moment | None, name: str) -> int | None:
-    """Nanoseconds since the epoch.
+def moment_text(given: Moment | None, name: str) -> str | None:
+    """A moment as the command line takes it.
 
     Raises:
         UsageError: a text is not RFC 3339, or there is no time zone.
     """
-    if given is None or isinstance(given, int):
-        return given
+    found = moment_ns(given, name)
+    return None if found is None else str(found)
+
+
+def moment_ns(given: Moment | None, name: str) -> int | None:
+    """Nanoseconds since the epoch; raises as `moment_text`."""
     if isinstance(given, np.datetime64):
         return int(given.astype("datetime64[ns]").astype(np.int64))
+    if given is None or isinstance(given, int | np.integer):
+        return None if given is None else int(given)
     return time_ns(given.isoformat() if isinstance(given, datetime) else given, name)
 
 

@@ -10,10 +10,11 @@ import typer
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
 from mcap_landmarks.cli.option_groups import reading_logs
-from mcap_landmarks.locations import Location, location, size_of
+from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
-    from mcap_landmarks.evaluation.metrics import Evaluation, Pairing, Reference, RunResult
+    from mcap_landmarks.evaluation.evaluate import EvaluatedRun
+    from mcap_landmarks.evaluation.metrics import Evaluation
     from mcap_landmarks.evaluation.pose_metrics import Figures
 
 
@@ -59,21 +60,15 @@ def command(
 
     The truth is RESULT's own /ground_truth channels, or those of --reference.
     """
+    from mcap_landmarks.evaluation.evaluate import evaluate_file, pairing_by
     from mcap_landmarks.evaluation.metrics import frame_note
-    from mcap_landmarks.evaluation.read import read_reference, read_run
     from mcap_landmarks.runs.replacing import new_files
 
     with new_files([tum, thesis], [result, reference], overwrite=overwrite):
-        with progress(f"read {result.name}", size_of(result) or None) as advance:
-            run, truth, losses = read_run(result, advance)
-        if reference is not None:
-            other, more = read_reference(reference)
-            truth, losses = other.over(truth), losses + more
-        _check(result, run, truth)
-        pairing = _pairing(association, max_gap)
-        document = _evaluated(result, run, truth, pairing, aligned=align)
-        _export(run, truth, pairing, tum, thesis)
-    if document["localized"] and not document["scored"] and truth.trajectory is not None:
+        found = evaluate_file(result, reference, pairing_by(association.value, max_gap), aligned=align, watch=progress)
+        _export(found, tum, thesis)
+    document = found.figures
+    if document["localized"] and not document["scored"] and found.truth.trajectory is not None:
         warn(f"note: {result}: no pose has a truth near enough in time; see --max-gap and --association")
     if note := frame_note(document["position"], aligned=align):
         warn(f"note: {result}: {note}")
@@ -81,46 +76,13 @@ def command(
         say_json("evaluate", document)
     else:
         _print(document)
-    for loss in losses:
+    for loss in found.losses:
         warn(f"warning: {result}: {loss}")
-    if losses:
+    if found.losses:
         raise typer.Exit(PARTIAL)
 
 
-def _check(result: Location, run: "RunResult", truth: "Reference") -> None:
-    from mcap_landmarks.errors import RecordingError, UsageError
-
-    if not run.bundles and not len(run.trajectory) and run.landmarks is None:
-        raise RecordingError(f"{result}: has no results to evaluate; run localize on it first")
-    if truth.trajectory is None and truth.objects is None:
-        raise UsageError(f"{result}: holds no truth; name a log or a TUM trajectory that has it with --reference")
-    if not len(run.trajectory) and not run.bundles and truth.objects is None:
-        raise UsageError(f"{result}: a map is measured against objects; name a log with them with --reference")
-
-
-def _pairing(association: PoseAssociation, max_gap_s: float) -> "Pairing":
-    from mcap_landmarks.evaluation.trajectory import interpolated, nearest
-
-    if association is PoseAssociation.NEAREST:
-        return partial(nearest, max_difference_ns=10_000_000)
-    return partial(interpolated, max_gap_ns=round(max_gap_s * 1e9))
-
-
-def _evaluated(
-    result: Location, run: "RunResult", truth: "Reference", pairing: "Pairing", *, aligned: bool
-) -> "Evaluation":
-    from mcap_landmarks.errors import UsageError
-    from mcap_landmarks.evaluation.metrics import evaluate
-
-    try:
-        return evaluate(run, truth, pairing, aligned=aligned)
-    except UsageError as error:
-        raise UsageError(f"{result}: {error}") from error
-
-
-def _export(
-    run: "RunResult", truth: "Reference", pairing: "Pairing", tum: Location | None, thesis: Location | None
-) -> None:
+def _export(found: "EvaluatedRun", tum: Location | None, thesis: Location | None) -> None:
     from mcap_landmarks.atomic import atomic_file
     from mcap_landmarks.evaluation.metrics import score
     from mcap_landmarks.evaluation.thesis_results import results_of
@@ -129,11 +91,11 @@ def _export(
 
     if tum:
         with atomic_file(tum) as stream:
-            stream.write(render(run.trajectory).encode())
+            stream.write(render(found.run.trajectory).encode())
     if thesis:
-        scored = score(run.trajectory, truth, pairing, aligned=False)
+        scored = score(found.run.trajectory, found.truth, found.pairing, aligned=False)
         with atomic_file(thesis) as stream:
-            stream.write(render_results(results_of(run, scored)).encode())
+            stream.write(render_results(results_of(found.run, scored)).encode())
 
 
 def _print(document: "Evaluation") -> None:

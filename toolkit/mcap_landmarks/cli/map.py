@@ -48,7 +48,9 @@ def command(
         _from_reference(logs, database, given)
         return
     asked = Given(given, images, scans, {"extrinsics": extrinsics}, use, ["build_map.fixed=true"] * fixed)
-    run = _build(logs, database, prior, output, asked)
+    from mcap_landmarks.runs.build_map import build_map_of
+
+    run = build_map_of(asked.requests(logs), database, output, prior, progress)
     for log in run.logs:
         tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)
     tell(map_file, (), run.build.outcome.notes, ())
@@ -58,20 +60,6 @@ def command(
         _print(run, database)
     if any(log.outcome.losses for log in run.logs):
         raise typer.Exit(PARTIAL)
-
-
-def _build(
-    logs: list[Location], database: Path, prior: Location | None, output: Location | None, given: Given
-) -> "MapRun":
-    from mcap_landmarks.runs.build_map import build_map
-    from mcap_landmarks.runs.map_plan import MapTask
-    from mcap_landmarks.runs.outputs import no_empty_folder, output_files
-
-    requests = tuple(given.requests(logs))
-    if output is None:
-        return build_map(MapTask(requests, database, prior=prior), progress)
-    with no_empty_folder(output):
-        return build_map(MapTask(requests, database, output_files(logs, output), prior), progress)
 
 
 def _from_reference(logs: list[Location], database: Path, given: LogOptions) -> None:

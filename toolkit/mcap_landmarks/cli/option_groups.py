@@ -12,13 +12,10 @@ from typer.models import OptionInfo
 
 from mcap_landmarks import memory
 from mcap_landmarks.cli import options
-from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
-
-    from mcap_landmarks.runs.thinning import Thinning
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -48,29 +45,6 @@ class ImageOptions:
     image_rate: options.ImageRate = None
     every: options.Every = None
 
-    def topics(self) -> tuple[str | None, tuple[str, ...]]:
-        """The topic of the one camera, and those of several; `all` is of several.
-
-        Raises:
-            UsageError: `all` is not alone.
-        """
-        from mcap_landmarks.inspection.cameras import ALL
-
-        given = tuple(dict.fromkeys(self.image or ()))
-        if ALL in given and len(given) > 1:
-            raise UsageError(f"--image {ALL} takes every camera that has a CameraInfo; give it alone, or name topics")
-        return (given[0], ()) if len(given) == 1 and given != (ALL,) else (None, given)
-
-    def thinning(self) -> "Thinning":
-        """Which images are left out.
-
-        Raises:
-            UsageError: an option cannot be read.
-        """
-        from mcap_landmarks.runs.thinning import parse_thinning
-
-        return parse_thinning(self.image_rate, self.every)
-
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class ScanOptions:
@@ -79,37 +53,6 @@ class ScanOptions:
     scan: options.ScanTopics = None
     scan_from: options.ScanFrom = None
     heights: options.Slice = None
-
-    def topics(self) -> list[str] | None:
-        """The topics to read scans from.
-
-        Raises:
-            UsageError: a topic of scans and one of clouds are given, or more than two.
-        """
-        if self.scan and self.scan_from:
-            raise UsageError("--scan-from takes the place of --scan; to merge a scan and a cloud give both with --scan")
-        if len(self.scan or ()) > 2:
-            raise UsageError(f"--scan {' '.join(self.scan or ())}: two are the most that are merged")
-        return [self.scan_from] if self.scan_from else self.scan
-
-    def settings(self) -> list[str]:
-        """The setting that a slice of a point cloud stands for.
-
-        Raises:
-            UsageError: the heights cannot be read.
-        """
-        if self.heights is None:
-            return []
-        low, colon, high = self.heights.partition(":")
-        try:
-            slice_m = (float(low), float(high)) if colon else (0.0, 0.0)
-        except ValueError:
-            slice_m = (0.0, 0.0)
-        if not slice_m[0] < slice_m[1]:
-            raise UsageError(
-                f"--slice {self.heights}: give two heights in metres, the lower one first, such as 0.1:0.3"
-            )
-        return [f"cluster.slice_m=[{slice_m[0]}, {slice_m[1]}]"]
 
 
 def spread(command: Callable[..., None], *, reads: bool = False) -> Callable[..., None]:

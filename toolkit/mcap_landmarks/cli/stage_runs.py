@@ -1,7 +1,7 @@
 """What the verbs that run stages over logs share: the runs themselves, notes, documents, exit codes."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import typer
@@ -9,11 +9,9 @@ import typer
 from mcap_landmarks.cli.console import PARTIAL, progress, say_json, warn
 from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
 from mcap_landmarks.locations import Location
-from mcap_landmarks.moments import time_ns
 from mcap_landmarks.wording import tallied
 
 if TYPE_CHECKING:
-    from mcap_landmarks.runs.bundles import Span
     from mcap_landmarks.runs.pipeline import LogRun
     from mcap_landmarks.runs.plan import Request
     from mcap_landmarks.runs.session import StageRun
@@ -40,57 +38,39 @@ class Given:
         Raises:
             UsageError: an option cannot be read, or a setting is wrong.
         """
-        from mcap_landmarks.config import gather
-        from mcap_landmarks.runs.plan import Request
+        from mcap_landmarks.runs.run_options import RunOptions
 
-        given, files = self.options, {"model": self.images.model, **self.files}
-        own = [*self.scans.settings(), *self.settings]
-        settings = gather(given.config_file, [*(given.settings or []), *own], given.method)
-        span, thinning, use = self._span(), self.images.thinning(), tuple(self.use or ())
-        first = Request(
-            logs[0],
-            settings,
-            files,
-            span,
-            thinning,
-            use,
+        given, images, scans = self.options, self.images, self.scans
+        return RunOptions(
+            given.config_file,
+            [*(given.settings or []), *self.settings],
+            given.method,
+            given.start,
+            given.end,
+            given.remap or (),
+            given.time_offset or (),
+            given.odom,
+            images.image or (),
+            images.image_rate,
+            images.every,
+            scans.scan or (),
+            scans.scan_from,
+            scans.heights,
+            {"model": images.model, **self.files},
+            self.use or (),
             results_only=given.results_only,
             force=given.force,
             overwrite=given.overwrite,
-            config_file=given.config_file,
-        )
-        return [replace(first, recording=log) for log in logs]
-
-    def _span(self) -> "Span":
-        from mcap_landmarks.inspection.time_offsets import parse_offsets
-        from mcap_landmarks.inspection.topic_roles import Choice, parse_remaps
-        from mcap_landmarks.runs.bundles import Span
-
-        given, scans = self.options, dict(zip(("scan", "second_scan"), self.scans.topics() or (), strict=False))
-        one, several = self.images.topics()
-        topics = {"odometry": given.odom, "image": one, **scans}
-        known = {role: topic for role, topic in topics.items() if topic}
-        offsets_ns = parse_offsets(given.time_offset or [])
-        choice = Choice(known, parse_remaps(given.remap or []), several, offsets_ns)
-        return Span(choice, time_ns(given.start, "--start"), time_ns(given.end, "--end"))
+        ).requests(logs)
 
 
 def run_over(
     verb: str, names: Sequence[str], logs: Sequence[Location], output: Location, given: Given, *, lacking: bool = False
 ) -> "list[LogRun]":
     """Run stages over every log; `lacking` puts those before them that a log still lacks."""
-    from mcap_landmarks.runs.outputs import no_empty_folder, output_files
-    from mcap_landmarks.runs.pipeline import run_stages
-    from mcap_landmarks.runs.replacing import check_apart
+    from mcap_landmarks.runs.pipeline import run_logs
 
-    requests = given.requests(logs)
-    with no_empty_folder(output):
-        targets = output_files(logs, output)
-        check_apart(targets.values(), [place for request in requests for place in request.reads()])
-        return [
-            run_stages(request, targets[request.recording], names, verb, progress, lacking=lacking)
-            for request in requests
-        ]
+    return run_logs(given.requests(logs), output, names, verb, progress, lacking=lacking)
 
 
 def finish(

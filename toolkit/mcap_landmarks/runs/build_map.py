@@ -8,6 +8,7 @@ from pathlib import Path
 
 from mcap_landmarks.atomic import held
 from mcap_landmarks.errors import MapError, RecordingError
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import Manifest, Outcome
 from mcap_landmarks.mapping.built_map import BuiltMap
 from mcap_landmarks.mapping.observations import LogObservations
@@ -26,7 +27,9 @@ from mcap_landmarks.runs.map_results import (
     write_part,
 )
 from mcap_landmarks.runs.original_stamps import trajectory_as_stamped
+from mcap_landmarks.runs.outputs import no_empty_folder, output_files
 from mcap_landmarks.runs.pipeline import told
+from mcap_landmarks.runs.plan import Request
 from mcap_landmarks.runs.replacing import check_apart, check_replaceable, earlier_map, earlier_recording
 from mcap_landmarks.runs.session import Session, StageRun, open_session, parts_folder
 from mcap_landmarks.runs.stage_input import StageInput
@@ -52,6 +55,21 @@ def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
             run = _build(plan, parts, watch)
         written = [write_log(plan, log, one, parts, watch) for log, one in zip(plan.logs, run.logs, strict=True)]
     return replace(run, logs=tuple(written))
+
+
+def build_map_of(
+    requests: Sequence[Request],
+    database: Path,
+    output: Location | None = None,
+    prior: Location | None = None,
+    watch: Watch = unwatched,
+) -> MapRun:
+    """`build_map` of logs, which are written with their results to `output` if there is one; raises the same."""
+    if output is None:
+        return build_map(MapTask(tuple(requests), database, prior=prior), watch)
+    with no_empty_folder(output):
+        outputs = output_files([request.recording for request in requests], output)
+        return build_map(MapTask(tuple(requests), database, outputs, prior), watch)
 
 
 def _check_replaceable(plan: MapPlan) -> None:

@@ -37,10 +37,10 @@ def toml(tables: Mapping[str, Mapping[str, object]]) -> str:
             if value is None:
                 lines.append(f"# {key} is unset")
             elif key not in nested:
-                lines.append(f"{_key(key)} = {_value(value)}")
+                lines.append(f"{_key(key)} = {toml_value(value)}")
         for key, value in nested.items():
             lines += ["", f"[{_key(name)}.{_key(key)}]"]
-            lines += [f"{_key(inner)} = {_value(one)}" for inner, one in value.items()]
+            lines += [f"{_key(inner)} = {toml_value(one)}" for inner, one in value.items()]
     return "\n".join(lines[1:]) + "\n"
 
 
@@ -48,12 +48,13 @@ def _key(text: str) -> str:
     return text if _BARE.fullmatch(text) else json.dumps(text, ensure_ascii=False)
 
 
-def _value(value: object) -> str:
+def toml_value(value: object) -> str:
+    """One value as TOML."""
     if isinstance(value, Mapping):
-        inside = ", ".join(f"{_key(key)} = {_value(one)}" for key, one in value.items() if one is not None)
+        inside = ", ".join(f"{_key(key)} = {toml_value(one)}" for key, one in value.items() if one is not None)
         return f"{{{inside}}}"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(_value(one) for one in value)}]"
+        return f"[{', '.join(toml_value(one) for one in value)}]"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     return str(value).lower() if isinstance(value, bool) else repr(value)

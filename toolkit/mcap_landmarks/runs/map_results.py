@@ -22,6 +22,7 @@ from mcap_landmarks.runs.output_writer import write_output
 from mcap_landmarks.runs.pipeline import told
 from mcap_landmarks.runs.session import StageRun, open_session, part_file
 from mcap_landmarks.stage import Stamped
+from mcap_landmarks.wording import counted
 
 VERB = "map"
 """What the manifests of a map and of its logs call what made them."""
@@ -41,7 +42,7 @@ class MappedLog:
     outcome: Outcome
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class MapRun:
     """The map, what became of it and of each log, and how the solver ended; None where the method solves nothing."""
 
@@ -49,6 +50,14 @@ class MapRun:
     build: StageRun
     logs: tuple[MappedLog, ...]
     termination: Termination | None
+
+    def __repr__(self) -> str:
+        return f"<MapRun of {counted(len(self.logs), 'log')}: {self.landmark_map!r}, {self.build.state}>"
+
+    @property
+    def losses(self) -> tuple[str, ...]:
+        """What could not be read of the logs, in words."""
+        return tuple(f"{log.recording}: {loss}" for log in self.logs for loss in log.outcome.losses)
 
     @property
     def sources(self) -> tuple[MapSource, ...]:

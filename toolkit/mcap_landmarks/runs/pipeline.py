@@ -11,13 +11,14 @@ from mcap_landmarks.progress import Watch, unwatched
 from mcap_landmarks.runs.clock_refusal import clock_notes
 from mcap_landmarks.runs.needed_stages import in_order, missing_stages
 from mcap_landmarks.runs.output_writer import write_output
+from mcap_landmarks.runs.outputs import no_empty_folder, output_files
 from mcap_landmarks.runs.plan import Request, check_cameras, plan
 from mcap_landmarks.runs.replacing import check_apart, check_replaceable, earlier_recording
 from mcap_landmarks.runs.session import StageRun, open_session, parts_folder
 from mcap_landmarks.stages import find_stage
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class LogRun:
     """What became of one log: where the output is, what each stage did, and what is to be said about the log."""
 
@@ -26,6 +27,10 @@ class LogRun:
     stages: tuple[StageRun, ...]
     notes: tuple[str, ...] = ()
     losses: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        stages = ", ".join(f"{run.stage} {run.state}" for run in self.stages)
+        return f"<LogRun of {self.recording}: {self.output}; {stages}>"
 
     @property
     def outcome(self) -> Outcome:
@@ -68,6 +73,24 @@ def run_stages(
         runs = [session.work(step, watch) for step in steps]
         notes, losses = write_output(session, output, verb, inputs, watch)
         return LogRun(request.recording, output, tuple(runs), *told(runs, [*notes, *clocks], losses))
+
+
+def run_logs(
+    requests: Sequence[Request],
+    output: Location,
+    names: Sequence[str],
+    verb: str,
+    watch: Watch = unwatched,
+    *,
+    lacking: bool = False,
+) -> list[LogRun]:
+    """`run_stages` over every log, to files as `output_files` names them; raises the same."""
+    with no_empty_folder(output):
+        targets = output_files([request.recording for request in requests], output)
+        check_apart(targets.values(), [place for request in requests for place in request.reads()])
+        return [
+            run_stages(request, targets[request.recording], names, verb, watch, lacking=lacking) for request in requests
+        ]
 
 
 def told(
