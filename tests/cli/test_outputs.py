@@ -2,6 +2,7 @@
 
 import json
 import os
+import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -44,6 +45,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("evaluate {0}/a.mcap --reference {0}/b.mcap --tum {0}/b.mcap --overwrite", "is the input itself"),
         ("evaluate {0}/a.mcap --tum {0}/config.toml", "with --overwrite"),
         ("convert {0}/a.mcap -o {0}/b.mcap", "with --overwrite"),
+        ("recover {0}/a.mcap -o {0}/hard.mcap --overwrite", "a.mcap itself; write to another file"),
+        ("convert {0}/a.mcap -o {0}/a.mcap --to rosbag2 --overwrite", "is the input itself"),
+        ("foxglove {0}/a.mcap -o {0}/hard.mcap --overwrite", "a.mcap itself; write to another file"),
         ("landmarks export {0}/a.db {0}/a.db --overwrite", "is the input itself"),
         ("landmarks import {0}/a.db {0}/a.db --overwrite", "is the input itself"),
         ("export {0}/a.mcap --format tum -o {0}/hard.mcap --overwrite", "a.mcap itself; write to another file"),
@@ -56,6 +60,40 @@ def test_what_is_there_stays(folder: Path, capsys: pytest.CaptureFixture[str], l
     before = {path: path.read_bytes() for path in folder.iterdir()}
     assert reason in refused(capsys, 2, *line.format(folder).split())
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_parts_never_take_the_place_of_the_input(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "a.mcap"
+    log.write_bytes((folder / "a.mcap").read_bytes())
+    (tmp_path / "a_0.mcap").hardlink_to(log)
+    assert "is the input" in refused(capsys, 2, "convert", log, "-o", tmp_path, "--split-count", 50, "--overwrite")
+    assert (tmp_path / "a.mcap").read_bytes() == (folder / "a.mcap").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "convert {0}/a.mcap -o {1}/out.mcap --exclude /tf",
+        "convert {0}/a.mcap -o {1}/parts --split-count 50",
+        "convert {0}/a.mcap -o {1}/bag --to rosbag2",
+        "convert {0}/a.mcap -o {1}/out.bag --to bag",
+        "recover {0}/a.mcap -o {1}/out.mcap",
+    ],
+)
+def test_where_nothing_more_can_be_written_nothing_is_left(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str
+) -> None:
+    """A limit of the size of files stands for a full disk."""
+    earlier = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, earlier[1]))
+    try:
+        told = refused(capsys, 1, *line.format(folder, tmp_path).split())
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, earlier)
+    assert "cannot be written (File too large); free space or choose another place" in told
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
 def test_the_same_again_needs_no_word(folder: Path, tmp_path: Path) -> None:
