@@ -43,7 +43,7 @@ LINES = {
     "models get": "models get nanodet --from {archive}",
     "plot": "plot {inputs} -o {output}",
     "recover": "recover {log} -o {output} --definitions {definitions}",
-    "report": "report {result} -o {output} --reference {reference}",
+    "report": "report {results} -o {output} --reference {reference}",
     "run": "run {logs} -o {output} --stages detect,cluster,fuse,localize --map {map_file} --model {model} "
     "--names {names} --extrinsics {extrinsics} --config {config_file}",
 }
@@ -79,7 +79,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
     (folder / "config.toml").touch()
     (folder / "State.msg").write_text("int32 value\n")
     return {
-        **dict.fromkeys(("log", "logs", "inputs", "paths", "baseline", "reference", "result"), log),
+        **dict.fromkeys(("log", "logs", "inputs", "paths", "baseline", "reference", "result", "results"), log),
         **dict.fromkeys(("map_file", "database", "prior"), database),
         "candidate": scenes,
         "model": two_posts(folder / "model.onnx"),

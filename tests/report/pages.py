@@ -37,9 +37,9 @@ def chromium() -> str:
 
 
 @contextmanager
-def opened(browser: Browser, path: Path, width: int = 1280, scheme: str = "light") -> Iterator[Watched]:
+def opened(browser: Browser, path: Path, width: int = 1280) -> Iterator[Watched]:
     """A page that is open in a browser, which may load its file and nothing else, and finds nothing wrong in it."""
-    context = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    context = browser.new_context(viewport={"width": width, "height": 900})
     watched = Watched(context.new_page())
 
     def answer(route: Route) -> None:

@@ -1,4 +1,4 @@
-"""Write a page to look at and to send: one HTML file that opens offline."""
+"""Write a page to look at and to send: of one result, of what changed between two, or of many."""
 
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,15 +15,21 @@ if TYPE_CHECKING:
 
 @reading_logs
 def command(
-    result: Annotated[
-        Location,
+    results: Annotated[
+        list[Location],
         typer.Argument(
-            metavar="RESULT", parser=location, help="Logs with results, a MAP.db, or results.txt as in Appendix D."
+            metavar="RESULT...", parser=location, help="Logs with results, a MAP.db, or results.txt as in Appendix D."
         ),
     ],
     output: Annotated[
         Location, typer.Option("-o", "--output", parser=location, help="The page to write, such as report.html.")
     ],
+    diff: Annotated[
+        bool,
+        typer.Option(
+            "--diff", help="Take two results as BASELINE and CANDIDATE: both overlaid, the worst changes first."
+        ),
+    ] = False,
     align: Annotated[
         bool, typer.Option("--align", help="Move estimates by the SE(2) that fits the truth best.")
     ] = False,
@@ -34,17 +40,20 @@ def command(
     overwrite: options.Overwrite = False,
     json: options.Json = False,
 ) -> None:
-    """Write one HTML file about RESULT that opens offline: map, errors, every bundle with its image and decision."""
+    """Write one HTML file about RESULT that opens offline: map, errors, every bundle with its image and decision.
+
+    Several results become a table to sort, the worst first; two with --diff one page of what changed.
+    """
     from mcap_landmarks.report.page.written_report import check_report, written_report
     from mcap_landmarks.runs.replacing import earlier_picture, output_to
 
-    check_report(output)
-    read = [result, *([reference] if reference is not None else [])]
+    check_report(results, output, is_diff=diff)
+    read = [*results, *([reference] if reference is not None else [])]
     with (
-        output_to(output, read, earlier_picture("report", [result]), overwrite=overwrite),
-        progress("read", size_of(result) or None) as advance,
+        output_to(output, read, earlier_picture("report", results), overwrite=overwrite),
+        progress("read", sum(map(size_of, results)) or None) as advance,
     ):
-        made = written_report([result], output, reference, aligned=align, progress=advance)
+        made = written_report(results, output, reference, is_diff=diff, aligned=align, progress=advance)
     _tell(made, output, as_json=json)
     if made.losses:
         raise typer.Exit(PARTIAL)

@@ -20,15 +20,25 @@ STATUSES = (*(status.name.lower() for status in Status), "mapped", "unmatched")
 """What a bundle can be: what came of its match, on the path of a map that was made, or neither yet."""
 WORDS = (
     "localized",
-    "ambiguous: several places fit",
+    "ambiguous",
     "too few objects",
-    "no match: no place fits",
+    "no match",
     "inconsistent",
     "weak geometry",
     "on the path of the map",
     "not matched yet",
 )
-"""The statuses in words."""
+HINTS = (
+    "all conditions of a match held",
+    "several places of the map fit as well",
+    "fewer objects than a pose needs",
+    "no place of the map fits",
+    "most of the objects or their distances do not fit the place",
+    "the objects stand so that the pose would be too uncertain",
+    "a pose of the path that was found with the map",
+    "no stage has matched it with a map",
+)
+"""The statuses in words, and what they mean."""
 MAPPED, UNMATCHED = len(Status), len(Status) + 1
 _CHANNELS: tuple[Channel[Message], ...] = (MATCH, SCENE_OBJECTS, SCAN_OBJECTS, DETECTIONS)
 """Whose messages are the bundles: those of the stage that got farthest."""

@@ -56,9 +56,12 @@ def read_result(
     reference: Reference | None = None,
     *,
     aligned: bool = False,
+    is_brief: bool = False,
     progress: Progress | None = None,
 ) -> PagedResult:
     """The result in a file; `reference` is the truth that counts before its own, `aligned` moves it onto the truth.
+
+    What is brief has neither odometry nor statistics of the detector.
 
     Raises:
         ToolkitError: the file cannot be read, has nothing to show, or cannot be aligned.
@@ -85,8 +88,8 @@ def read_result(
                 drawing,
                 evaluation,
                 read_bundles(recording, run.trajectory.time_ns if run.continuous else run.trajectory.time_ns[:0]),
-                _odometry(recording),
-                detector_statistics(recording),
+                None if is_brief else _odometry(recording),
+                None if is_brief else detector_statistics(recording),
                 recording.metadata.get(RUN),
                 is_log=True,
                 has_images=_has_images(recording),

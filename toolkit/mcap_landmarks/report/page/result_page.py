@@ -9,7 +9,7 @@ import numpy as np
 from mcap_landmarks.evaluation.pose_metrics import Figures
 from mcap_landmarks.evaluation.thesis_results import results_of
 from mcap_landmarks.manifest import RUN, stage_records
-from mcap_landmarks.report.page.bundle_table import STATUSES, WORDS
+from mcap_landmarks.report.page.bundle_table import HINTS, STATUSES, WORDS
 from mcap_landmarks.report.page.chosen_bundles import evenly
 from mcap_landmarks.report.page.html_page import html_page
 from mcap_landmarks.report.page.paged_result import PagedResult
@@ -55,7 +55,9 @@ def result_page(result: PagedResult, mark: str) -> MadePage:
 
 def status_names() -> list[dict[str, str]]:
     """The statuses as the page's script knows them."""
-    return [{"name": name, "words": words} for name, words in zip(STATUSES, WORDS, strict=True)]
+    return [
+        {"name": name, "words": words, "hint": hint} for name, words, hint in zip(STATUSES, WORDS, HINTS, strict=True)
+    ]
 
 
 def _first(document: Mapping[str, object]) -> str | None:

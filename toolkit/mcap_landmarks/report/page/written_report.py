@@ -1,16 +1,20 @@
 """A report from files to a file: which page it is, reading, and writing it."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from mcap_landmarks.atomic import atomic_file, check_target
-from mcap_landmarks.errors import UsageError
+from mcap_landmarks.diff.comparison import diff
+from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.evaluation.metrics import Reference
 from mcap_landmarks.evaluation.read import read_reference
 from mcap_landmarks.locations import Location
 from mcap_landmarks.progress import Progress
-from mcap_landmarks.report.page.paged_result import read_result
+from mcap_landmarks.report.page.diff_page import diff_page
+from mcap_landmarks.report.page.fleet_page import UnreadResult, fleet_page
+from mcap_landmarks.report.page.paged_result import PagedResult, read_result
 from mcap_landmarks.report.page.result_page import MadePage, result_page
 from mcap_landmarks.runs.replacing import picture_mark
 
@@ -39,15 +43,17 @@ class WrittenReport:
         }
 
 
-def check_report(output: Location) -> None:
+def check_report(results: Sequence[Location], output: Location, *, is_diff: bool) -> None:
     """Refuse what cannot become a page.
 
     Raises:
-        UsageError: the output's name is not of a page or it cannot be written.
+        UsageError: the output's name is not of a page or it cannot be written, or --diff is not of two results.
     """
     check_target(output)
     if output.suffix.lower() not in _ENDINGS:
         raise UsageError(f"{output}: a report is a page; use a name that ends with .html")
+    if is_diff and len(results) != 2:
+        raise UsageError(f"--diff is of two results, BASELINE and CANDIDATE, not of {len(results)}; name both")
 
 
 def written_report(
@@ -55,24 +61,64 @@ def written_report(
     output: Location,
     reference: Location | None = None,
     *,
+    is_diff: bool = False,
     aligned: bool = False,
     progress: Progress | None = None,
 ) -> WrittenReport:
-    """Read results and write their page.
+    """Read results and write their page: of one, of two that are compared, or of many.
 
     Raises:
-        ToolkitError: a result or the reference cannot be read, or the page cannot be written.
+        ToolkitError: a result or the reference cannot be read, of many all cannot, or the page cannot be written.
     """
     truth, lost = read_reference(reference) if reference is not None else (Reference(), [])
     losses = [f"{reference}: {loss}" for loss in lost]
-    mark = picture_mark("report", results)
-    names = names_of(results)
-    result = read_result(results[0], names[0], truth, aligned=aligned, progress=progress)
-    losses += [f"{result.path}: {loss}" for loss in result.losses]
-    page = result_page(result, mark)
+    mark, names = picture_mark("report", results), names_of(results)
+    read = partial(read_result, reference=truth, aligned=aligned, progress=progress)
+    kind = "diff" if is_diff else "page" if len(results) == 1 else "table"
+    if kind == "table":
+        found, unread = _readable(results, names, partial(read, is_brief=True))
+        page = fleet_page(found, unread, mark)
+        names = tuple(one.name for one in found)
+        losses += [f"{one.name} could not be read: {one.reason}" for one in unread]
+    else:
+        found = [read(path, name) for path, name in zip(results, names, strict=True)]
+        page = _diff(results, found, reference, losses, mark) if is_diff else result_page(found[0], mark)
+    losses += [f"{one.path}: {loss}" for one in found for loss in one.losses]
     with atomic_file(output) as stream:
         stream.write(page.content)
-    return WrittenReport("page", names, page, tuple(losses))
+    return WrittenReport(kind, names, page, tuple(dict.fromkeys(losses)))
+
+
+def _diff(
+    results: Sequence[Location],
+    found: Sequence[PagedResult],
+    reference: Location | None,
+    losses: list[str],
+    mark: str,
+) -> MadePage:
+    """The page of two results; what their diff cannot read is added to the losses."""
+    compared = diff(results[0], results[1], reference=reference)
+    losses += compared.losses
+    return diff_page(found[0], found[1], compared.document, compared.losses, mark)
+
+
+def _readable(
+    results: Sequence[Location], names: Sequence[str], read: Callable[[Location, str], PagedResult]
+) -> tuple[list[PagedResult], list[UnreadResult]]:
+    """The results that can be read, and the others.
+
+    Raises:
+        RecordingError: there is none that can.
+    """
+    found, unread = list[PagedResult](), list[UnreadResult]()
+    for path, name in zip(results, names, strict=True):
+        try:
+            found.append(read(path, name))
+        except RecordingError as error:
+            unread.append(UnreadResult(name, str(error)))
+    if not found:
+        raise RecordingError(f"none of {len(unread)} results can be read, the first because: {unread[0].reason}")
+    return found, unread
 
 
 def names_of(results: Sequence[Location]) -> tuple[str, ...]:

@@ -156,19 +156,23 @@ function aroundView(detail) {
   const objects = detail.objects || [], points = detail.points ? unpacked(detail.points) : [];
   const which = detail.point_clusters ? unpacked(detail.point_clusters) : null;
   const spots = [...objects.map((one) => [one.x_m, one.y_m]), ...detail.clusters, ...detail.landmarks.filter((one) => one[4])];
-  let reach = Math.max(1.5, ...spots.map(([x, y]) => Math.max(Math.abs(x), Math.abs(y)))) * 1.15;
-  if (!spots.length) for (let i = 0; i < points.length; i += 2) reach = Math.max(reach, Math.abs(points[i]), Math.abs(points[i + 1]));
-  const unit = reach / 100, at = (x, y) => [-y, -x];
-  const svg = node("svg", { class: "around", viewBox: `${-reach} ${-reach} ${2 * reach} ${2 * reach}`, role: "img", "aria-label": "From above, ahead is up" });
-  const step = reach > 40 ? 20 : reach > 16 ? 10 : reach > 8 ? 5 : reach > 3 ? 2 : 1;
-  for (let radius = step; radius < reach * 1.4; radius += step) {
+  const at = (x, y) => [-y, -x];
+  if (!spots.length) for (let i = 0; i < points.length; i += 2) spots.push([points[i], points[i + 1]]);
+  const ends = (axis) => { const all = [0, ...spots.map(([x, y]) => at(x, y)[axis])]; return [Math.min(...all), Math.max(...all)]; };
+  const [[left, right], [top, bottom]] = [ends(0), ends(1)];
+  const reach = Math.max(1.5, (right - left) / 2, (bottom - top) / 2) * 1.2, unit = reach / 100;
+  const middle = [(left + right) / 2, (top + bottom) / 2], inside = (x, y) => Math.abs(x - middle[0]) < reach && Math.abs(y - middle[1]) < reach;
+  const svg = node("svg", { class: "around", viewBox: `${middle[0] - reach} ${middle[1] - reach} ${2 * reach} ${2 * reach}`, role: "img", "aria-label": "From above, ahead is up" });
+  const step = reach > 40 ? 20 : reach > 16 ? 10 : reach > 6 ? 5 : reach > 3 ? 2 : 1;
+  for (let radius = step; radius < reach * 3; radius += step) {
     svg.append(node("circle", { cx: 0, cy: 0, r: radius, fill: "none", stroke: colour("line"), "stroke-width": unit * 0.5 }));
-    if (radius < reach) svg.append(label(0, radius, `${radius} m`, unit, colour("soft"), "middle"));
+    const written = [[radius, 0], [-radius, 0], [0, radius], [0, -radius]].find(([x, y]) => inside(x * 1.02, y * 1.02) && spots.every((spot) => Math.hypot(at(...spot)[0] - x, at(...spot)[1] - y) > 14 * unit));
+    if (written) svg.append(label(written[0], written[1] + 2.5 * unit, `${radius} m`, unit, colour("soft"), "middle"));
   }
   let dots = new Map();
   for (let i = 0; i < points.length; i += 2) {
     const [x, y] = at(points[i], points[i + 1]);
-    if (Math.abs(x) > reach || Math.abs(y) > reach) continue;
+    if (!inside(x, y)) continue;
     const fill = which ? CLASS_COLOURS[Math.round(100 * which[i / 2]) % 8] : colour("soft");
     dots.set(fill, (dots.get(fill) || "") + `M${x.toFixed(2)} ${y.toFixed(2)}h0`);
   }
@@ -186,7 +190,8 @@ function aroundView(detail) {
     if (one.landmark) svg.append(node("line", { x1: 0, y1: 0, x2: x, y2: y, stroke: colour("accent"), "stroke-width": unit * 0.5, opacity: 0.6 }));
     if (region) svg.append(node("ellipse", { cx: x, cy: y, rx: Math.max(region[0], unit), ry: Math.max(region[1], unit), transform: `rotate(${-90 - region[2]} ${x} ${y})`, fill: colour("candidate"), "fill-opacity": 0.18, stroke: colour("candidate"), "stroke-width": unit * 0.5 }));
     svg.append(node("circle", { cx: x, cy: y, r: unit * 1.5, fill: colour("candidate") }));
-    svg.append(label(x + unit * 3 * (x > reach * 0.5 ? -1 : 1), y - unit * 2, one.class || "?", unit, colour("ink"), x > reach * 0.5 ? "end" : "start"));
+    const turned = x > middle[0] + reach * 0.4;
+    svg.append(label(x + unit * (turned ? -3 : 3), y - unit * 2, one.class || "?", unit, colour("ink"), turned ? "end" : "start"));
   });
   svg.append(node("polygon", { points: `0,${-unit * 5} ${unit * 3.5},${unit * 4} ${-unit * 3.5},${unit * 4}`, fill: colour("ink") }));
   const legend = [points.length ? "dots: points" : "", detail.clusters.length ? "squares: clusters" : "", objects.length ? "discs: objects" : "", detail.landmarks.length ? "crosses: landmarks of the map" : ""].filter(Boolean).join(", ");
@@ -255,12 +260,13 @@ function placeAt(x, width) {
 
 function layout(more) {
   const axis = { gridcolor: colour("grid"), zerolinecolor: colour("line"), linecolor: colour("line"), tickcolor: colour("line"), automargin: true };
-  const made = { paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: colour("ink"), size: 12, family: "system-ui, sans-serif" }, margin: { l: 50, r: 10, t: 30, b: 40 }, hovermode: "closest", hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } }, legend: { orientation: "h", y: -0.12, font: { size: 11 } }, ...more };
+  const made = { paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: colour("ink"), size: 12, family: "system-ui, sans-serif" }, margin: { l: 50, r: 10, t: 30, b: 40 }, hovermode: "closest", modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("soft"), activecolor: colour("ink") }, hoverlabel: { bgcolor: colour("card"), bordercolor: colour("line"), font: { color: colour("ink") } }, legend: { orientation: "h", y: -0.12, font: { size: 11 } }, ...more };
   for (const [key, value] of Object.entries(made)) if (/^[xy]axis/.test(key)) made[key] = { ...axis, ...value };
   return made;
 }
 
-const CONFIG = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["lasso2d", "select2d", "autoScale2d"] };
+// Only what works without any network: the library has buttons that send a plot elsewhere.
+const CONFIG = { displaylogo: false, responsive: true, modeBarButtons: [["toImage", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]] };
 
 function line(name, [x, y], shade, dash, width) {
   return { name, x, y, mode: "lines", type: "scatter", hoverinfo: "skip", line: { color: shade, dash, width } };
@@ -291,8 +297,9 @@ function mapTraces() {
     if (!two) traces.push(errorTrace(run));
     statuses.forEach((status, number) => traces.push(...bundleTrace(run, side, number, before)));
   });
-  const mapped = runs.find((run) => run.landmarks.length);
-  if (mapped) traces.push(...landmarkTraces(mapped));
+  const places = (run) => JSON.stringify(run.landmarks.map((one) => [one.class, one.at]));
+  const maps = runs.filter((run) => run.landmarks.length), same = maps.length === 2 && places(maps[0]) === places(maps[1]);
+  (same ? maps.slice(0, 1) : maps).forEach((run) => traces.push(...landmarkTraces(run, maps.length === 2 && !same)));
   const known = runs.find((run) => run.objects.length);
   if (known) traces.push({ name: "true objects", type: "scatter", mode: "markers", x: known.objects.map((one) => one[0]), y: known.objects.map((one) => one[1]), text: known.objects.map((one) => plain(`true ${one[2]}`)), hoverinfo: "text", marker: { symbol: "circle-open", size: 17, color: colour("truth") } });
   traces.push({ name: "chosen", type: "scatter", mode: "lines+markers", x: [], y: [], hoverinfo: "skip", showlegend: false, line: { color: colour("accent"), width: 1.5 }, marker: { symbol: "circle-open", size: [], color: colour("accent"), line: { width: 3 } } });
@@ -313,22 +320,23 @@ function bundleTrace(run, side, status, before) {
   return [{ name: plain(`${before}${statuses[status].words} (${run.counts[status]})`), type: "scatter", mode: "markers", x: rows.map((row) => bundles.x[row]), y: rows.map((row) => bundles.y[row]), customdata: rows.map((row) => momentAt.get(bundles.stamp[row])), text, hoverinfo: "text", marker: { symbol: SYMBOLS[status] + open, size: isFailure(status) ? 10 : 6, color: colourOf(status), line: { width: isFailure(status) ? 1 : 0, color: colour("card") } } }];
 }
 
-function landmarkTraces(run) {
+function landmarkTraces(run, named) {
+  const before = named ? `${data.sides[runs.indexOf(run)]}: ` : "", open = named && run === runs[0] ? "-open" : "";
   const regions = run.landmarks.filter((one) => one.region).map((one) => one.region);
-  const traces = regions.length ? [{ ...regionTrace("landmarks' 95 % regions", regions, colour("region")) }] : [];
+  const traces = regions.length ? [{ ...regionTrace(`${before}landmarks' 95 % regions`, regions, colour("region")) }] : [];
   const counts = new Map();
   run.landmarks.forEach((one) => counts.set(one.class, (counts.get(one.class) || 0) + 1));
   const names = [...counts.keys()].sort((a, b) => counts.get(b) - counts.get(a) || (a < b ? -1 : 1));
   const groups = names.length > 8 ? [["landmark", run.landmarks]] : names.map((name) => [name, run.landmarks.filter((one) => one.class === name)]);
-  groups.forEach(([name, members], place) => traces.push({ name: plain(name || "landmark without class"), type: "scatter", mode: "markers", x: members.map((one) => one.at[0]), y: members.map((one) => one.at[1]), text: members.map((one) => plain(`${one.class}, landmark ${one.id}${run.bundles.stamp.length ? ", matched " + one.matched + " times" : ""}`)), hoverinfo: "text", marker: { symbol: CLASS_SYMBOLS[place], size: 11, color: CLASS_COLOURS[place], line: { width: 1, color: colour("card") } } }));
+  groups.forEach(([name, members], place) => traces.push({ name: plain(before + (name || "landmark without class")), type: "scatter", mode: "markers", x: members.map((one) => one.at[0]), y: members.map((one) => one.at[1]), text: members.map((one) => plain(`${one.class}, landmark ${one.id}${run.bundles.stamp.length ? ", matched " + one.matched + " times" : ""}`)), hoverinfo: "text", marker: { symbol: CLASS_SYMBOLS[place] + open, size: 11, color: CLASS_COLOURS[place], line: { width: 1, color: colour("card") } } }));
   return traces;
 }
 
 function drawMap() {
   const place = byId("map");
   if (!place) return;
-  const narrow = matchMedia("(max-width: 900px)").matches;
-  const shape = layout({ dragmode: "pan", xaxis: { title: { text: "x [m]" } }, yaxis: { title: { text: "y [m]" }, scaleanchor: "x" }, margin: { l: 48, r: 8, t: 34, b: 42 }, uirevision: "map" });
+  const narrow = matchMedia("(max-width: 900px)").matches, phone = matchMedia("(max-width: 560px)").matches;
+  const shape = layout({ dragmode: "pan", xaxis: { ticksuffix: " m" }, yaxis: { ticksuffix: " m", scaleanchor: "x" }, legend: { orientation: "h", y: -0.07, font: { size: 11 } }, margin: { l: 44, r: 8, t: 34, b: 30 }, uirevision: "map", showlegend: !phone });
   Plotly.react(place, mapTraces(), shape, { ...CONFIG, scrollZoom: !narrow, displayModeBar: true }).then(() => {
     if (place.dataset.heeded) return;
     place.dataset.heeded = "yes";
@@ -368,12 +376,12 @@ function drawErrors() {
       if (box.outliers.length) plots.push({ type: "scatter", mode: "markers", x: box.outliers, y: box.outliers.map(() => `${before}${name}`), hoverinfo: "x", marker: { symbol: "circle-open", size: 5, color: shades[side] }, showlegend: false, ...tag });
     });
   });
-  Plotly.react(curves, traces, layout({ title: { text: "over time", font: { size: 13 } }, xaxis: { title: { text: "seconds" } }, yaxis: { title: { text: "m" }, domain: [0.42, 1] }, yaxis2: { title: { text: "degrees" }, domain: [0, 0.34] }, legend: { orientation: "h", y: -0.22 } }), CONFIG).then(() => {
+  Plotly.react(curves, traces, layout({ title: { text: "over time", font: { size: 13 } }, xaxis: { ticksuffix: " s", anchor: "y2" }, yaxis: { ticksuffix: " m", domain: [0.44, 1] }, yaxis2: { ticksuffix: "°", domain: [0, 0.36] }, legend: { orientation: "h", y: -0.16 } }), CONFIG).then(() => {
     if (curves.dataset.heeded) return;
     curves.dataset.heeded = "yes";
     curves.on("plotly_click", (event) => choose(nearestTo(event.points[0].x)));
   });
-  Plotly.react(boxes, plots, layout({ title: { text: "box plots", font: { size: 13 } }, xaxis: { title: { text: "m" }, anchor: "y" }, yaxis: { domain: [0.55, 1], autorange: "reversed" }, xaxis2: { title: { text: "degrees" }, anchor: "y2" }, yaxis2: { domain: [0, 0.2], autorange: "reversed" }, margin: { l: 60, r: 10, t: 30, b: 40 } }), CONFIG);
+  Plotly.react(boxes, plots, layout({ title: { text: "box plots", font: { size: 13 } }, xaxis: { ticksuffix: " m", anchor: "y", nticks: 6 }, yaxis: { domain: [0.42, 1], autorange: "reversed" }, xaxis2: { ticksuffix: "°", anchor: "y2", nticks: 6 }, yaxis2: { domain: [0, 0.24], autorange: "reversed" }, margin: { l: 60, r: 10, t: 30, b: 40 } }), CONFIG);
 }
 
 function nearestTo(t) {
@@ -396,6 +404,7 @@ function drawLegend() {
     const counts = runs.map((run) => run.counts[number]);
     if (!counts.some(Boolean)) return;
     const button = node("button", { type: "button", "data-status": status.name }, node("span", { class: "glyph", "aria-hidden": "true" }, GLYPHS[number]), ` ${status.words} ${counts.join(" → ")}`);
+    button.title = status.hint;
     button.firstChild.style.color = colourOf(number);
     button.onclick = () => chooseNext((moment) => runs.some((_, side) => statusOf(moment, side) === number));
     buttons.push(button);
@@ -448,6 +457,11 @@ function heedSorting() {
   };
 }
 
+// A link of the table opens the section that it goes to.
+function heedLinks() {
+  for (const link of document.querySelectorAll("#logs a")) link.addEventListener("click", () => { byId(link.getAttribute("href").slice(1)).open = true; });
+}
+
 function setTheme(dark) {
   document.documentElement.dataset.theme = dark ? "dark" : "light";
   byId("theme").textContent = dark ? "Light" : "Dark";
@@ -466,6 +480,7 @@ setTheme(prefersDark.matches);
 prefersDark.addEventListener("change", (event) => { setTheme(event.matches); drawAll(); });
 byId("theme").onclick = () => { setTheme(document.documentElement.dataset.theme !== "dark"); drawAll(); };
 heedSorting();
+heedLinks();
 heedDrive();
 if (data.first && momentAt.has(data.first)) chosen = momentAt.get(data.first);
 drawAll();
