@@ -81,7 +81,7 @@ def _picture(picture: Picture, scan_ns: int, store: PictureStore) -> dict[str, o
 def _regions(scene: SceneObjects) -> list[list[float] | None]:
     """The 95 % regions of objects: semi-axes and direction; None where the covariance is unknown."""
     radii, directions_rad = regions_95(scene.covariances)
-    known: list[bool] = scene.covariances.any(axis=(1, 2)).tolist()
+    known = [bool(spread.any()) for spread in scene.covariances]
     rows = np.column_stack([radii, np.degrees(directions_rad)]).tolist()
     return [row if is_known else None for row, is_known in zip(rows, known, strict=True)]
 

@@ -72,7 +72,7 @@ def landmarks(result: PagedResult) -> list[Document]:
         return []
     seen = Counter(chain.from_iterable(result.run.seen.values()))
     regions = _ellipses(scene.positions_xy, scene.covariances)
-    known: list[bool] = scene.covariances.any(axis=(1, 2)).tolist()
+    known = [bool(spread.any()) for spread in scene.covariances]
     return [
         {"id": name, "class": label, "at": region[:2], "region": region if has else None, "matched": seen[name]}
         for name, label, region, has in zip(scene.ids, scene.classes, regions, known, strict=True)
