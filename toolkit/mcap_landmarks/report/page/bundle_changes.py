@@ -42,22 +42,25 @@ def bundle_changes(baseline: PagedResult, candidate: PagedResult) -> list[Bundle
     then those that only one run has, at last those that are localized now.
     """
     mine, theirs = _side(baseline), _side(candidate)
-    found = []
-    for stamp_ns in sorted({*mine.statuses, *theirs.statuses}):
-        off_m = mine.off_m.get(stamp_ns), theirs.off_m.get(stamp_ns)
-        if stamp_ns not in mine.statuses or stamp_ns not in theirs.statuses:
-            where = "baseline" if stamp_ns in mine.statuses else "candidate"
-            found.append(BundleChange(stamp_ns, 3, f"only the {where} has it", None, off_m))
-            continue
-        before, after = mine.statuses[stamp_ns], theirs.statuses[stamp_ns]
-        moved = _moved(mine.poses.get(stamp_ns), theirs.poses.get(stamp_ns))
-        if before != after:
-            rank = 0 if before == Status.LOCALIZED else 4 if after == Status.LOCALIZED else 2
-            found.append(BundleChange(stamp_ns, rank, f"{WORDS[before]} → {WORDS[after]}", moved, off_m))
-        elif moved is not None:
-            false = (off_m[1] or 0.0) > FALSE_M >= (off_m[0] or 0.0)
-            found.append(BundleChange(stamp_ns, 1 if false else 2, "false now" if false else "moved", moved, off_m))
+    stamps = sorted({*mine.statuses, *theirs.statuses})
+    found = [change for stamp_ns in stamps if (change := _change(stamp_ns, mine, theirs)) is not None]
     return sorted(found, key=_worst_first)
+
+
+def _change(stamp_ns: int, mine: _Side, theirs: _Side) -> BundleChange | None:
+    off_m = mine.off_m.get(stamp_ns), theirs.off_m.get(stamp_ns)
+    before, after = mine.statuses.get(stamp_ns), theirs.statuses.get(stamp_ns)
+    if before is None or after is None:
+        where = "candidate" if before is None else "baseline"
+        return BundleChange(stamp_ns, 3, f"only the {where} has it", None, off_m)
+    moved = _moved(mine.poses.get(stamp_ns), theirs.poses.get(stamp_ns))
+    if before != after:
+        rank = 0 if before == Status.LOCALIZED else 4 if after == Status.LOCALIZED else 2
+        return BundleChange(stamp_ns, rank, f"{WORDS[before]} → {WORDS[after]}", moved, off_m)
+    if moved is None:
+        return None
+    is_false = (off_m[1] or 0.0) > FALSE_M >= (off_m[0] or 0.0)
+    return BundleChange(stamp_ns, 1 if is_false else 2, "false now" if is_false else "moved", moved, off_m)
 
 
 def _worst_first(one: BundleChange) -> tuple[int, float, int]:

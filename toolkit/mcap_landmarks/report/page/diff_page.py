@@ -28,7 +28,7 @@ def diff_page(
     changes = bundle_changes(baseline, candidate)
     wanted = np.array([one.stamp_ns for one in changes], dtype=np.int64)
     drawn = [result_document(side, wanted, share=0.5) for side in (baseline, candidate)]
-    listed, start_ns = changes[:_SHOWN], min(int(str(one.document["start_ns"])) for one in drawn)
+    start_ns = min(int(str(one.document["start_ns"])) for one in drawn)
     values = {
         "title": f"{baseline.name} → {candidate.name}",
         "verdict": _verdict(document, changes),
@@ -36,16 +36,8 @@ def diff_page(
         "missing": [f"Not all could be read, and what cannot be read was not compared: {loss}." for loss in losses],
         "has_map": any(len(side.bundles) or side.drawing.landmarks is not None for side in (baseline, candidate)),
         "has_errors": any(one.document["errors"] for one in drawn),
-        "changes": [_change(one, start_ns) for one in listed],
-        "changes_words": f"The worst {len(listed)} of {counted(len(changes), 'changed bundle')}." if changes else "",
-        "metrics": [
-            [name, *(_figure(row[side]) for side in ("baseline", "candidate", "delta"))]
-            for name, row in document["metrics"].items()
-        ],
-        "channels": [_channel(name, entry) for name, entry in document["channels"].items() if _differs(entry)],
-        "same_channels": sum(not _differs(entry) for entry in document["channels"].values()),
-        "cases": [case for name, entry in document["channels"].items() for case in _cases(name, entry)],
-        "declared": [[row["key"], _cut(row["baseline"]), _cut(row["candidate"])] for row in document["manifest"]],
+        **_listed(changes, start_ns),
+        **_tables(document),
         "thinned": _thinned(drawn),
     }
     data = {
@@ -57,6 +49,21 @@ def diff_page(
     }
     page = html_page("diff.html.j2", values, data, mark, has_plots=True)
     return MadePage(page, [one.counts for one in drawn], _thinned(drawn))
+
+
+def _tables(document: DiffDocument) -> dict[str, object]:
+    """The tables of what the diff found: figures, channels, single fields, and what was meant to differ."""
+    channels = {name: entry for name, entry in document["channels"].items() if _differs(entry)}
+    return {
+        "metrics": [
+            [name, _figure(row["baseline"]), _figure(row["candidate"]), _figure(row["delta"])]
+            for name, row in document["metrics"].items()
+        ],
+        "channels": [_channel(name, entry) for name, entry in channels.items()],
+        "same_channels": len(document["channels"]) - len(channels),
+        "cases": [case for name, entry in channels.items() for case in _cases(name, entry)],
+        "declared": [[row["key"], _cut(row["baseline"]), _cut(row["candidate"])] for row in document["manifest"]],
+    }
 
 
 def _on_one_clock(drawn: Sequence[DrawnResult], start_ns: int) -> list[dict[str, object]]:
@@ -113,6 +120,12 @@ def _tiles(baseline: PagedResult, candidate: PagedResult) -> list[tuple[str, str
         false = [round(side["false"]["count"] or 0) for side in (mine, theirs)]
         found.append(("false poses", str(false[1]), f"was {false[0]}", false[1] > false[0]))
     return found
+
+
+def _listed(changes: Sequence[BundleChange], start_ns: int) -> dict[str, object]:
+    """The rows of the worst changes, and how many of all these are."""
+    rows = [_change(one, start_ns) for one in changes[:_SHOWN]]
+    return {"changes": rows, "changes_words": f"The worst {len(rows)} of {counted(len(changes), 'changed bundle')}."}
 
 
 def _change(one: BundleChange, start_ns: int) -> dict[str, object]:

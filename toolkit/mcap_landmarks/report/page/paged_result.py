@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mcap_landmarks.channels import CAMERA_IMAGE, ODOMETRY
 from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
@@ -75,30 +75,30 @@ def read_result(
         evaluation = evaluate(run, truth, PAIRING, aligned=aligned)
     except UsageError as error:
         raise UsageError(f"{path}: {error}") from error
-    has_truth = truth.trajectory is not None or truth.objects is not None
-    if is_map or is_text:
-        manifest = read_manifest(path) if is_map else None
-        result = PagedResult(name, path, run, drawing, evaluation, manifest=manifest, has_truth=has_truth)
-    else:
-        with open_recording(path) as recording:
-            result = PagedResult(
-                name,
-                path,
-                run,
-                drawing,
-                evaluation,
-                read_bundles(recording, run.trajectory.time_ns if run.continuous else run.trajectory.time_ns[:0]),
-                None if is_brief else _odometry(recording),
-                None if is_brief else detector_statistics(recording),
-                recording.metadata.get(RUN),
-                is_log=True,
-                has_images=_has_images(recording),
-                has_truth=has_truth,
-                losses=tuple(losses),
-            )
+    result = PagedResult(name, path, run, drawing, evaluation, losses=tuple(losses))
+    result = replace(result, has_truth=truth.trajectory is not None or truth.objects is not None)
+    if is_map:
+        result = replace(result, manifest=read_manifest(path))
+    elif not is_text:
+        result = _with_log(result, is_brief=is_brief)
     if not len(result.bundles) and drawing.landmarks is None and not len(run.trajectory):
         raise RecordingError(f"{path}: holds no results to show; run localize, map or another stage on it first")
     return result
+
+
+def _with_log(result: PagedResult, *, is_brief: bool) -> PagedResult:
+    """The result with what else its log tells."""
+    times_ns = result.run.trajectory.time_ns
+    with open_recording(result.path) as recording:
+        return replace(
+            result,
+            bundles=read_bundles(recording, times_ns if result.run.continuous else times_ns[:0]),
+            odometry=None if is_brief else _odometry(recording),
+            detector=None if is_brief else detector_statistics(recording),
+            manifest=recording.metadata.get(RUN),
+            is_log=True,
+            has_images=_has_images(recording),
+        )
 
 
 def _has_images(recording: Recording) -> bool:
