@@ -6,9 +6,10 @@ import typer
 
 from mcap_landmarks.cli import diff_options, options
 from mcap_landmarks.cli.console import DONE, USAGE, progress, say_json
+from mcap_landmarks.cli.diff_drives import print_drives
 from mcap_landmarks.cli.diff_options import SetOptions
 from mcap_landmarks.cli.diff_sets import diff_folders
-from mcap_landmarks.cli.diff_text import DIFFERENT, print_diff, warn_of
+from mcap_landmarks.cli.diff_text import DIFFERENT, print_diff, warn_losses, warn_of
 from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.locations import Location, size_of, to_read
@@ -25,6 +26,7 @@ def command(
     fail_on: diff_options.FailOn = None,
     reference: diff_options.Truth = None,
     align: diff_options.Align = False,
+    drives: diff_options.Drives = None,
     sets: SetOptions = SetOptions(),  # noqa: B008 - spread out into its options
     json: options.Json = False,
 ) -> None:
@@ -43,12 +45,13 @@ def command(
     before, after = _sides(baseline, candidate, sets)
     try:
         if to_read(before).is_dir() or to_read(after).is_dir() or sets.blessed is not None:
-            if tolerance or align:
-                raise UsageError("--tolerance and --align are of two files; metrics of folders have --criteria")
+            if any((tolerance, align, drives is not None)):
+                raise UsageError("--tolerance, --align and --drives are of two files; folders have --criteria")
             code = diff_folders(before, after, sets, fail_on or [], reference, json=json)
         else:
             sets.refuse_for_files()
-            code = _diff_files(before, after, tolerance or [], fail_on or [], reference, aligned=align, json=json)
+            files = before, after, tolerance or [], fail_on or [], reference
+            code = _diff_files(*files, aligned=align, json=json, drives=drives)
     except ToolkitError as error:
         raise UsageError(str(error)) from error  # 1 means different, so that every error is 2
     raise typer.Exit(code)
@@ -64,6 +67,48 @@ def _sides(baseline: Location, candidate: Location | None, sets: SetOptions) -> 
     return sets.blessed, baseline
 
 
+def _are_drives(baseline: Location, candidate: Location, asked: bool | None) -> bool:
+    from mcap_landmarks.diff.two_drives import are_two_drives
+    from mcap_landmarks.evaluation.read import is_database
+    from mcap_landmarks.recording.reader import open_recording
+
+    if is_database(baseline) or is_database(candidate):
+        if asked:
+            raise UsageError("--drives is of two logs; maps are compared as they are")
+        return False
+    if asked is not None:
+        return asked
+    with open_recording(baseline) as mine, open_recording(candidate) as theirs:
+        return are_two_drives(mine, theirs)
+
+
+def _diff_drives(
+    baseline: Location,
+    candidate: Location,
+    tolerances: "Sequence[str]",
+    fail_on: "Sequence[str]",
+    reference: Location | None,
+    *,
+    json: bool,
+) -> int:
+    from mcap_landmarks.diff.conditions import parse
+    from mcap_landmarks.diff.drives import diff_drives
+
+    if tolerances:
+        raise UsageError("--tolerance is of messages that both have, and these are two drives; see --no-drives")
+    conditions = [parse(text) for text in fail_on]
+    with progress("compare", size_of(baseline) + size_of(candidate)) as advance:
+        found = diff_drives(baseline, candidate, conditions, reference=reference, progress=advance)
+    if json:
+        say_json("diff_drives", found.document)
+    else:
+        print_drives(found.document)
+    warn_losses(found.losses)
+    if found.losses:
+        return USAGE
+    return DIFFERENT if found.fails else DONE
+
+
 def _diff_files(
     baseline: Location,
     candidate: Location,
@@ -73,10 +118,13 @@ def _diff_files(
     *,
     aligned: bool,
     json: bool,
+    drives: bool | None,
 ) -> int:
     from mcap_landmarks.diff.comparison import diff
     from mcap_landmarks.diff.conditions import parse
 
+    if _are_drives(baseline, candidate, drives):
+        return _diff_drives(baseline, candidate, tolerances, fail_on, reference, json=json)
     conditions = [parse(text) for text in fail_on]
     with progress("compare", size_of(baseline) + size_of(candidate)) as advance:
         found = diff(

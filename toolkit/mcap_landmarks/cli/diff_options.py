@@ -50,6 +50,14 @@ Truth = Annotated[
 Align = Annotated[
     bool, typer.Option("--align", help="Of databases: move the candidate by the one SE(2) that fits best.")
 ]
+Drives = Annotated[
+    bool | None,
+    typer.Option(
+        "--drives/--no-drives",
+        help="Of logs: whether they are of two drives, which share no messages. Found out by default.",
+        show_default=False,
+    ),
+]
 
 
 @dataclass(frozen=True, slots=True)

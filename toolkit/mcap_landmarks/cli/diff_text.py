@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Literal
 
 from mcap_landmarks.cli.console import say, table, warn
@@ -28,9 +28,14 @@ def warn_of(found: "Diff") -> None:
     if channels and not any(channel["same"] or channel["changed"] for channel in channels.values()):
         remedy = "try --align" if "landmarks" in channels else "are they of the same recording?"
         warn(f"note: nothing of the one has its like in the other; {remedy}")
-    for loss in found.losses:
+    warn_losses(found.losses)
+
+
+def warn_losses(losses: Sequence[str]) -> None:
+    """Say on stderr what could not be read."""
+    for loss in losses:
         warn(f"warning: {loss}")
-    if found.losses:
+    if losses:
         warn("error: what cannot be read was not compared; recover the log first")
 
 

@@ -21,6 +21,7 @@ _NOT_VERBS = {
     "options",
     "stage_runs",
     "conversion_options",
+    "diff_drives",
     "diff_options",
     "diff_text",
     "diff_sets",

@@ -44,7 +44,7 @@ def rows_of(baseline: Mapping[str, object], candidate: Mapping[str, object]) -> 
 def structure_rows(baseline: Recording, candidate: Recording) -> list[StructureRow]:
     """Channels that only one has, whose type, definition or number of messages differs; metadata and attachments."""
     mine, theirs = by_topic(baseline), by_topic(candidate)
-    counts = _message_counts(baseline), _message_counts(candidate)
+    counts = message_counts(baseline), message_counts(candidate)
     rows = []
     for topic in sorted({*mine, *theirs}):
         rows += _description_rows(topic, mine.get(topic, ()), theirs.get(topic, ()))
@@ -113,7 +113,8 @@ def _digest(connections: Connections) -> str:
     return hashlib.sha256(b"".join(texts)).hexdigest()[:16]
 
 
-def _message_counts(recording: Recording) -> dict[str, int]:
+def message_counts(recording: Recording) -> dict[str, int]:
+    """The number of messages of each topic."""
     counts: dict[str, int] = {}
     for entry in recording.channels:
         counts[entry.connection.topic] = counts.get(entry.connection.topic, 0) + entry.count

@@ -46,13 +46,11 @@ def metric_rows(
     losses += [f"{baseline}: {loss}" for loss in lost] + [f"{candidate}: {loss}" for loss in more]
     if any(side.trajectory is None and side.objects is None for side in (truth, other)):
         return {}, losses
-    return _side_by_side(flat(evaluate(mine, truth, PAIRING)), flat(evaluate(theirs, other, PAIRING))), losses
+    return side_by_side(flat(evaluate(mine, truth, PAIRING)), flat(evaluate(theirs, other, PAIRING))), losses
 
 
-def _side_by_side(
-    baseline: Mapping[str, float | None], candidate: Mapping[str, float | None]
-) -> dict[str, MetricEntry]:
-    """The figures that either side has."""
+def side_by_side(baseline: Mapping[str, float | None], candidate: Mapping[str, float | None]) -> dict[str, MetricEntry]:
+    """The figures that either side has, with their changes."""
     rows: dict[str, MetricEntry] = {}
     for name in {**baseline, **candidate}:
         mine, theirs = baseline.get(name), candidate.get(name)
