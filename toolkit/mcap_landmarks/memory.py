@@ -3,6 +3,7 @@
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from typing import Generic, Protocol, TypeVar, overload
 
 from mcap_landmarks.errors import RecordingError, UsageError
@@ -43,8 +44,11 @@ def allow(text: str | None) -> None:
 
 def bound() -> int:
     """The bytes that one thing of a file may take."""
-    if _Bound.given is not None:
-        return _Bound.given
+    return _half_of_all() if _Bound.given is None else _Bound.given
+
+
+@cache
+def _half_of_all() -> int:
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2
 
 

@@ -5,6 +5,7 @@ import sqlite3
 from array import array
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -47,11 +48,10 @@ def unpacker() -> Callable[[Payload], Payload]:
     It raises MessageError where that is damaged. Each has a decompressor, which takes longer to make than to use, and
     serves one thread at a time.
     """
-    decompressor = zstandard.ZstdDecompressor()
-    return lambda data: _unpacked(data, decompressor)
+    return partial(_unpacked, zstandard.ZstdDecompressor())
 
 
-def _unpacked(data: Payload, decompressor: zstandard.ZstdDecompressor) -> Payload:
+def _unpacked(decompressor: zstandard.ZstdDecompressor, data: Payload) -> Payload:
     if data[:4] != ZSTD_MAGIC:
         return data
     try:
@@ -188,6 +188,9 @@ class Db3Log:
         wanted = self._wanted(connections)
         first, end = _FIRST if start_ns is None else start_ns, _LAST if end_ns is None else end_ns
         tell, read = progress or (lambda _read: None), 0
+        # This loop runs for every message: what it calls has local names, and RawMessage's own constructor, written in
+        # Python, is passed over.
+        get, new, magic = wanted.get, tuple.__new__, ZSTD_MAGIC
         for time_ns, _, key, data in self._ordered(first, end):
             if type(data) is not bytes or type(time_ns) is not int or time_ns < 0:
                 self._lose("rows without a sound time and payload are left out")
@@ -196,11 +199,11 @@ class Db3Log:
             if read >= _REPORT_BYTES:
                 tell(read)
                 read = 0
-            connection = wanted.get(key)
+            connection = get(key)
             if connection is not None:
-                payload = self._payload(connection, data) if data.startswith(ZSTD_MAGIC) else data
+                payload = self._payload(connection, data) if data[:4] == magic else data
                 if payload is not None:
-                    yield RawMessage(connection, time_ns, time_ns, 0, payload)
+                    yield new(RawMessage, (connection, time_ns, time_ns, 0, payload))
         tell(read)
 
     def _wanted(self, connections: Collection[Connection] | None) -> dict[int, Connection]:
@@ -219,9 +222,8 @@ class Db3Log:
         last: _Row = (first_ns, _FIRST, 0, b"")
         with _database(self._path) as database:
             try:
-                for row in _by_time(database, first_ns, end_ns):
-                    yield row
-                    last = row
+                for last in _by_time(database, first_ns, end_ns):
+                    yield last
             except sqlite3.DatabaseError as error:
                 self._damaged(error)
                 yield from _salvaged(database, last[:2], end_ns)
@@ -254,10 +256,9 @@ def _by_time(database: sqlite3.Connection, first_ns: int, end_ns: int) -> Iterat
     if not any("TEMP B-TREE" in row[3] for row in plan):
         cursor = database.cursor()
         cursor.row_factory = None  # plain tuples: names for the columns of each row take as long as reading it
-        yield from cursor.execute(whole, (first_ns, end_ns))
-        return
+        return cursor.execute(whole, (first_ns, end_ns))
     keys = database.execute(f"SELECT timestamp, rowid {within} {order}", (first_ns, end_ns))
-    yield from _fetched(database, ((int(row[0]), int(row[1])) for row in keys))
+    return _fetched(database, ((int(row[0]), int(row[1])) for row in keys))
 
 
 def _fetched(database: sqlite3.Connection, keys: Iterator[_Key]) -> Iterator[_Row]:
