@@ -217,3 +217,20 @@ def test_a_damaged_chunk_is_told_and_the_others_are_read(tmp_path: Path) -> None
     found, (loss,) = read(tmp_path / "a.mcap")
     assert 0 < len(found.log_time_ns) < 60
     assert loss.endswith("messages are left out")
+
+
+def test_chunks_of_messages_of_one_size_are_read_by_their_step(tmp_path: Path) -> None:
+    """Only those of one channel: others lie between its messages, or one is of another size."""
+    alike = [Scan("/scan", i * SECOND, "base_scan", 30) for i in range(40)]
+    logs = {
+        "alike": alike,
+        "odd": [*alike[:20], Scan("/scan", 20 * SECOND, "base_scan", 4), *alike[21:]],
+        "mixed": [*alike[:20], Scan("/other", 20 * SECOND, "base_scan", 30), *alike[21:]],
+        "strange": [*alike[:20], Scan("/scan", 20 * SECOND, "base_scan", 30, spoil=strange), *alike[21:]],
+    }
+    broken = {}
+    for name, scans in logs.items():
+        path = tmp_path / f"{name}.mcap"
+        path.write_bytes(log_of(scans, index=IndexType.NONE | IndexType.CHUNK, chunk_size=100_000))
+        broken[name] = read(path)[0].broken
+    assert broken == {"alike": 0, "odd": 0, "mixed": 0, "strange": 1}

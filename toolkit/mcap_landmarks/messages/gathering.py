@@ -27,11 +27,15 @@ _AT_ONCE = 2000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlacedMessages:
-    """N messages in a buffer: where their bytes start, and how many there are."""
+    """N messages in a buffer: where their bytes start, and how many there are; `step` is from each start to the next.
+
+    It is 0 where that varies.
+    """
 
     content: memoryview
     starts: Indices
     sizes: Indices
+    step: int = 0
 
     def __len__(self) -> int:
         return len(self.starts)
@@ -46,7 +50,9 @@ class PlacedMessages:
         return bytes(self.content[start : start + int(self.sizes[row])])
 
     def gather(self, offset: int, dtype: np.dtype[Any]) -> NDArray[Any]:
-        """What lies in each of them (N,) at an offset: a view of the buffer at every byte, indexed."""
+        """What lies in each of them (N,) at an offset: the buffer viewed at every byte, indexed, or at every step."""
+        if self.step and len(self):
+            return np.ndarray((len(self),), dtype, self.content, int(self.starts[0]) + offset, (self.step,))
         count = max(len(self.content) - offset - dtype.itemsize + 1, 0)
         every: NDArray[Any] = np.ndarray((count,), dtype, self.content, min(offset, len(self.content)), (1,))
         return every[self.starts]
@@ -56,7 +62,8 @@ class PlacedMessages:
         width = count * dtype.itemsize
         if not width:
             return np.zeros((len(self), count), dtype)
-        return self.gather(offset, np.dtype(f"V{width}")).view(dtype).reshape(len(self), count)
+        found = np.ascontiguousarray(self.gather(offset, np.dtype(f"V{width}")))
+        return found.view(dtype).reshape(len(self), count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,13 +86,18 @@ class _Form:
     def fits(self, messages: PlacedMessages) -> NDArray[np.bool_]:
         """Which messages (N,) are laid out like this: of this size, in little endian, with the same lengths inside."""
         found: NDArray[np.bool_] = messages.sizes == self.size
+        if found.all():
+            return self._fits(messages)
         rows = np.flatnonzero(found)
-        alike = messages if len(rows) == len(messages) else messages.at(rows)
-        same = alike.gather(0, _HALF) == int.from_bytes(LITTLE_ENDIAN, "little")
-        for offset, length in self.lengths:
-            same &= alike.gather(offset, _WORD) == length
-        found[rows] = same
+        found[rows] = self._fits(messages.at(rows))
         return found
+
+    def _fits(self, messages: PlacedMessages) -> NDArray[np.bool_]:
+        """The same of messages of this size."""
+        same: NDArray[np.bool_] = messages.gather(0, _HALF) == int.from_bytes(LITTLE_ENDIAN, "little")
+        for offset, length in self.lengths:
+            same &= messages.gather(offset, _WORD) == length
+        return same
 
     def table(self, messages: PlacedMessages, fields: Collection[str]) -> Table:
         """The fields of messages that are laid out like this."""
@@ -130,10 +142,12 @@ def _groups(
         form = _form(layout, messages.data(int(rest[0]))) if len(rest) else None
         if form is None:
             break
-        fits = form.fits(messages if len(rest) == len(messages) else messages.at(rest))
+        alike = messages if len(rest) == len(messages) else messages.at(rest)
+        fits = form.fits(alike)
+        if fits.all():
+            return [*found, (rest, form.table(alike, fields))], rest[:0]
         rows, rest = rest[fits], rest[~fits]
-        alike = messages if len(rows) == len(messages) else messages.at(rows)
-        found.append((rows, form.table(alike, fields)))
+        found.append((rows, form.table(messages.at(rows), fields)))
     return found, rest
 
 

@@ -84,16 +84,51 @@ def rows_in(stream: BinaryIO, block: Block, asked: Wanted, content: memoryview) 
     Raises:
         DamagedBlockError: a record runs over the end, or is too short for what it is.
     """
-    heads, starts = _messages(stream, block, content)
     first_ns, last_ns = asked.within_ns
+    is_whole = first_ns <= block.start_ns and block.end_ns < last_ns
+    if is_whole and (rows := _rows_of_one_size(content, asked)) is not None:
+        return rows
+    heads, starts = _messages(stream, block, content)
     wanted = heads["channel"] == asked.channel_id
-    if block.start_ns < first_ns or block.end_ns >= last_ns:
+    if not is_whole:
         wanted &= (heads["log"] >= np.uint64(max(first_ns, 0))) & (heads["log"] <= np.uint64(last_ns - 1))
     sizes = heads["length"][wanted].astype(np.int64) - MESSAGE_FIXED
     messages = PlacedMessages(content, starts[wanted] + MESSAGE.size, sizes)
     table, is_read = read_placed(asked.layout, messages, asked.fields)
     log, publish = (heads[name][wanted][is_read] for name in ("log", "publish"))
     return BlockRows(log, publish, table, len(messages) - table.rows)
+
+
+def _rows_of_one_size(content: memoryview, asked: Wanted) -> BlockRows | None:
+    """The rows of a content with wanted messages of one size only, behind what is declared; None for any other.
+
+    Each then begins where the one before ends, so that their heads tell as much as a look at one after the other.
+    """
+    first, size = _first_message(content)
+    count, rest = divmod(len(content) - first, size or 1)
+    if not size or rest:
+        return None
+    heads = np.ndarray((count,), _HEAD, content, first, (size,))
+    is_message = (heads["opcode"] == Opcode.MESSAGE) & (heads["channel"] == asked.channel_id)
+    if not (is_message & (heads["length"] == size - RECORD.size)).all():
+        return None
+    starts = np.arange(first + MESSAGE.size, len(content) + MESSAGE.size, size)
+    messages = PlacedMessages(content, starts, np.full(count, size - MESSAGE.size), size)
+    table, is_read = read_placed(asked.layout, messages, asked.fields)
+    if table.rows < count:
+        heads = heads[is_read]
+    return BlockRows(heads["log"], heads["publish"], table, count - table.rows)
+
+
+def _first_message(content: memoryview) -> tuple[int, int]:
+    """Where the first message record begins, and its size; 0 where there is none."""
+    position = 0
+    while position + MESSAGE.size <= len(content):
+        opcode, length = RECORD.unpack_from(content, position)
+        if opcode == Opcode.MESSAGE:
+            return position, RECORD.size + max(length, MESSAGE_FIXED)
+        position += RECORD.size + length
+    return 0, 0
 
 
 def _signed(times_ns: NDArray[np.uint64]) -> Indices:

@@ -18,6 +18,9 @@ from mcap_landmarks.stage import Connection
 
 MESSAGE_START = Struct("<HIQ")
 """The first fields of a message: channel, sequence, log time."""
+_CHUNK_INDEX, _PLACE, _BEHIND_PLACES, _SIZES = Struct("<QQQQI"), Struct("<HQ"), Struct("<QI"), Struct("<QQ")
+"""The fields of a chunk index: times, place and length up to the length of the places of its message indexes, each of
+these, what lies up to the name of the compression, and what behind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +181,7 @@ def _collect(
         elif opcode == Opcode.STATISTICS:
             statistics = parse(records.Statistics, content)
         elif opcode == Opcode.CHUNK_INDEX:
-            chunks.append(parse(records.ChunkIndex, content))
+            chunks.append(_chunk_index(content))
         elif opcode == Opcode.METADATA_INDEX:
             where = parse(records.MetadataIndex, content)
             record = parse(records.Metadata, read_record(stream, where.offset)[1])
@@ -190,6 +193,32 @@ def _collect(
     chunks.sort(key=lambda chunk: chunk.chunk_start_offset)
     index.blocks = [_block(chunk) for chunk in chunks]
     return index, chunks, statistics
+
+
+def _chunk_index(content: bytes) -> records.ChunkIndex:
+    """What `parse` gives, in a tenth of the time: logs have thousands.
+
+    Raises:
+        EOFError, struct.error, UnicodeDecodeError: the content is none such.
+    """
+    start_ns, end_ns, offset, length, places_bytes = _CHUNK_INDEX.unpack_from(content)
+    begin, end = _CHUNK_INDEX.size, _CHUNK_INDEX.size + places_bytes
+    if places_bytes % _PLACE.size or end > len(content):
+        raise EOFError
+    index_length, name_length = _BEHIND_PLACES.unpack_from(content, end)
+    name_end = end + _BEHIND_PLACES.size + name_length
+    compressed, uncompressed = _SIZES.unpack_from(content, name_end)
+    return records.ChunkIndex(
+        chunk_length=length,
+        chunk_start_offset=offset,
+        compression=content[end + _BEHIND_PLACES.size : name_end].decode(),
+        compressed_size=compressed,
+        message_end_time=end_ns,
+        message_index_length=index_length,
+        message_index_offsets=dict(_PLACE.iter_unpack(content[begin:end])),
+        message_start_time=start_ns,
+        uncompressed_size=uncompressed,
+    )
 
 
 def _block(chunk: records.ChunkIndex) -> Block:
