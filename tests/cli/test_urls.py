@@ -44,12 +44,14 @@ LINES = {
     "plot": "plot {inputs} -o {output}",
     "recover": "recover {log} -o {output} --definitions {definitions}",
     "report": "report {results} -o {output} --reference {reference}",
+    "video": "video {result} -o {output}",
     "run": "run {logs} -o {output} --stages detect,cluster,fuse,localize --map {map_file} --model {model} "
     "--names {names} --extrinsics {extrinsics} --config {config_file}",
 }
 """Every verb with every place where it takes a file, by the name of its parameter."""
 ENDINGS = {
     **dict.fromkeys(("explain", "plot", "models check", "models audition"), "png"),
+    "video": "mp4",
     **dict.fromkeys(("landmarks import", "landmarks export"), "json"),
     "report": "html",
 }

@@ -8,7 +8,7 @@ from mcap_landmarks.messages.typestore import full_name
 from mcap_landmarks.messages.video import CompressedVideo, TheoraPacket
 from mcap_landmarks.sources import counterpart
 from mcap_landmarks.stage import ChannelSummary, Connection
-from mcap_landmarks.vision.video import INSTALL
+from mcap_landmarks.vision.video_decoder import INSTALL
 
 _CONVERT = "convert it first: mcap-landmarks convert LOG -o OUT.mcap"
 _SENSED = (

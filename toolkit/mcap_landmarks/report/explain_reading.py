@@ -22,18 +22,16 @@ from mcap_landmarks.channels import (
     SCAN_OBJECTS,
     SCENE_OBJECTS,
     SCENE_VELOCITIES,
-    TF_STATIC,
 )
 from mcap_landmarks.config import stage_config
 from mcap_landmarks.errors import MessageError, RecordingError, UsageError
 from mcap_landmarks.evaluation.explain import Situation
 from mcap_landmarks.fusion.camera_view import CameraView, camera_from_info
 from mcap_landmarks.fusion.config import FuseConfig
-from mcap_landmarks.geometry.frames import FrameTree, apply, plain, rigid
+from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.inspection.camera_images import CameraImages, images_of
 from mcap_landmarks.inspection.topic_roles import Choice, cameras_of, choose, chosen_before, message_type
-from mcap_landmarks.lidar.beams import echoes
 from mcap_landmarks.lidar.scan_repair import ScanTopic
 from mcap_landmarks.localization.config import LocalizeConfig
 from mcap_landmarks.locations import Location
@@ -50,6 +48,7 @@ from mcap_landmarks.moments import moment
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.report.box_outcomes import LostBox, lost_boxes
 from mcap_landmarks.report.messages_around import BESIDE_NS, MessagesAround
+from mcap_landmarks.report.scan_points import scan_points, static_frames
 from mcap_landmarks.stage import Channel, Config, Connection, RawMessage
 from mcap_landmarks.vision.pixels import rgb_from_message
 
@@ -122,7 +121,7 @@ class Situations:
         self._images = images_of(recording, choice, _connections(recording, CAMERA_INFO, choice))
         self._first_infos = list(_first_infos(recording, self._channels))
         self._landmarks = _once(recording, MAP)
-        self._frames = _frames(recording)
+        self._frames = static_frames(recording)
         self._localize = _config(recording, LocalizeConfig, "localize")
         self._fuse = _config(recording, FuseConfig, "fuse")
 
@@ -186,7 +185,7 @@ class Situations:
         scan, seen = found.at(SCAN, stamp_ns), scene or found.at(SCAN_OBJECTS, stamp_ns)
         if scan is None or seen is None:
             return SensorData(tuple(pictures))
-        return SensorData(tuple(pictures), self._points(scan, seen.frame_id))
+        return SensorData(tuple(pictures), scan_points(scan, seen.frame_id, self._frames))
 
     def _beside_cloud(
         self, found: MessagesAround, picture: Picture, scene: SceneObjects, cloud: ClusteredCloud
@@ -205,16 +204,6 @@ class Situations:
             view = CameraView.at(camera, base_from_camera, np.zeros(3), 0.0)
             return picture._replace(view=view, lost=lost_boxes(detections, scene, cloud, view, self._fuse))
         return picture
-
-    def _points(self, scan: LaserScan, base: str) -> Array:
-        """Where the beams ended (N, 2), in the base frame if transforms lead there, else in the scanner's own."""
-        ranges_m = echoes(scan.ranges_m, scan.range_min_m, scan.range_max_m)
-        rows = np.flatnonzero(np.isfinite(ranges_m))
-        angle, range_m = scan.angle_min_rad + rows * scan.angle_increment_rad, ranges_m[rows]
-        points = np.column_stack([range_m * np.cos(angle), range_m * np.sin(angle), np.zeros(len(rows))])
-        with contextlib.suppress(RecordingError):
-            points = apply(self._frames.lookup(base, scan.frame_id), points)
-        return points[:, :2]
 
 
 def _span(recording: Recording) -> str:
@@ -264,16 +253,6 @@ def _pictures(found: MessagesAround, stamp_ns: int) -> list[Picture]:
                 pixels = rgb_from_message(image)
         pictures.append(Picture(pixels, boxes))
     return [*pictures, *(Picture(None, boxes) for boxes in detections.values())]
-
-
-def _frames(recording: Recording) -> FrameTree:
-    """The log's frames that stand still to each other."""
-    return FrameTree.of(
-        (step.frame_id, step.child_frame_id, rigid(step.translation_m, step.rotation_xyzw))
-        for connection in recording.connections(TF_STATIC.topic)
-        for raw in recording.messages([connection])
-        for step in decode(TF_STATIC.message, raw.data).transforms
-    )
 
 
 def _connections(recording: Recording, channel: Channel[Message], choice: Choice) -> tuple[Connection, ...]:

@@ -52,11 +52,12 @@ def save(draw: Callable[[], Figure], stream: BinaryIO, form: str, mark: str = ""
     with mpl.rc_context(), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         mpl.rcdefaults()
-        _set_style()
+        set_style()
         draw().savefig(stream, format=form, metadata=metadata, bbox_inches="tight", pad_inches=0.1)
 
 
-def _set_style() -> None:
+def set_style() -> None:
+    """Make everything that is drawn from now on look alike."""
     mpl.rc("font", size=9)
     mpl.rc("axes", edgecolor="#9CA3AF", labelcolor="#374151", linewidth=0.8)
     mpl.rc("xtick", color="#6B7280")
@@ -104,7 +105,7 @@ def _size(drawing: Drawing) -> tuple[float, float]:
 def _draw_map(axes: Axes, drawing: Drawing) -> None:
     scene, objects = drawing.landmarks, drawing.objects
     if scene is not None:
-        _draw_classes(axes, scene.classes, scene.positions_xy)
+        draw_classes(axes, scene.classes, scene.positions_xy)
         draw_ellipses(axes, scene.positions_xy, scene.covariances)
         _draw_groups(axes, drawing.groups, dict(zip(scene.ids, scene.positions_xy, strict=True)))
     if objects is not None and len(objects):
@@ -152,7 +153,7 @@ def draw_ellipses(axes: Axes, positions_xy: Array, covariances: Array) -> None:
     axes.scatter([], [], s=60, facecolors="#64748B26", edgecolors="#64748B", linewidths=0.7, label="95 % region")
 
 
-def _draw_classes(axes: Axes, classes: tuple[str, ...], positions_xy: Array) -> None:
+def draw_classes(axes: Axes, classes: tuple[str, ...], positions_xy: Array) -> None:
     """Few classes get a colour and marker each, many a label beside each landmark."""
     names = [name for name, _ in sorted(Counter(classes).items(), key=lambda item: (-item[1], item[0]))]
     if len(names) > len(_PALETTE):

@@ -29,6 +29,7 @@ from mcap_landmarks.messages.header import frame_in
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.markers import MarkerArray
 from mcap_landmarks.messages.points import PointCloud2
+from mcap_landmarks.messages.poses import Odometry
 from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.transforms import TFMessage, frames_in
 from mcap_landmarks.messages.video import CompressedVideo
@@ -80,7 +81,7 @@ class ViewedLog:
         """The topics that the results in the log were made of, as far as it tells."""
         images = chosen_before(self.recording, [record.options for record in self.records.values()])
         told = [topics for record in self.records.values() if isinstance(topics := _topics(record), dict)]
-        scans = {role: str(topic) for topics in told for role, topic in topics.items() if role == "scan"}
+        scans = {role: str(topic) for topics in told for role, topic in topics.items() if role in {"scan", "odometry"}}
         return Choice({**images.topics, **scans}, images=images.images)
 
     @cached_property
@@ -103,6 +104,11 @@ class ViewedLog:
         chosen = tuple(one for one in self._chosen(SCAN) if self.counts.get(one))
         found = chosen or self.of(LaserScan, MultiEchoLaserScan) or self.of(PointCloud2)
         return tuple(one for one in found if not one.topic.startswith(RESULTS))
+
+    @cached_property
+    def odometry(self) -> tuple[Connection, ...]:
+        """The odometry that results in the log used; where it does not tell, the only one."""
+        return tuple(one for one in self._chosen(ODOMETRY) if self.counts.get(one) and one.read_as == Odometry.ROS_TYPE)
 
     @cached_property
     def fixed_frame(self) -> str:

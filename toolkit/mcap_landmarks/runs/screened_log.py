@@ -24,7 +24,7 @@ from mcap_landmarks.recording.layered_log import Layer, LayeredLog
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
 from mcap_landmarks.vision.pixels import Rgb
-from mcap_landmarks.vision.video import VideoDecoder
+from mcap_landmarks.vision.video_decoder import VideoDecoder
 from mcap_landmarks.wording import counted
 
 _Piece = CompressedVideo | TheoraPacket | CompressedImage

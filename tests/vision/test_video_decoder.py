@@ -10,7 +10,7 @@ import pytest
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.messages.video import TheoraPacket, codec_of
 from mcap_landmarks.vision.pixels import Rgb
-from mcap_landmarks.vision.video import VideoDecoder
+from mcap_landmarks.vision.video_decoder import VideoDecoder
 from rosbags.highlevel import AnyReader
 
 COUNT, KEY = 20, 8
@@ -124,7 +124,7 @@ def test_real_theora(shared_data: Path) -> None:
 
 
 def test_pictures_that_are_too_large_are_not_decoded(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("mcap_landmarks.vision.video._MOST_PIXELS", SIZE[0] * SIZE[1] - 1)
+    monkeypatch.setattr("mcap_landmarks.vision.video_decoder._MOST_PIXELS", SIZE[0] * SIZE[1] - 1)
     assert all(isinstance(one, MessageError) for one in decoded("h264", packets()))
 
 
