@@ -14,9 +14,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location, to_read
-from mcap_landmarks.sources import find_source, source_names
+from mcap_landmarks.sources import SOURCES, find_source, source_names
 from mcap_landmarks.stage import Config, Stage
-from mcap_landmarks.stages import find_stage, stage_names
+from mcap_landmarks.stages import STAGES, find_stage, stage_names, usable_stages
 
 _C = TypeVar("_C", bound=Config)
 Settings = dict[str, dict[str, object]]
@@ -39,8 +39,9 @@ def gather(file: Location | None, settings: Sequence[str], method: str | None) -
         made = declaration(name)
         stage_config(made.config, name, {key: value for key, value in table.items() if key not in made.files})
     if method is not None:
-        for stage in stage_names():
-            gathered.setdefault(stage, {}).setdefault("method", method)
+        for stage in usable_stages():
+            if "method" in stage.config.__dataclass_fields__:  # packages' stages may have none
+                gathered.setdefault(stage.name, {}).setdefault("method", method)
     return gathered
 
 
@@ -53,11 +54,25 @@ class Declaration:
 
 
 def declaration(name: str) -> Declaration:
-    """The declaration of a stage or source by name."""
-    if name in source_names():
+    """The declaration of a stage or source by name.
+
+    Raises:
+        ExtensionError: the package that brings it cannot be used.
+    """
+    if name in source_names() and name not in STAGES.usable():
         return Declaration(find_source(name).config)
-    stage = find_stage(name)
+    stage = STAGES.own(name)
     return Declaration(stage.config, stage.files)
+
+
+def usable_names() -> list[str]:
+    """The names of all stages and sources; of packages' those that can be used."""
+    return [*STAGES.usable(), *SOURCES.usable()]
+
+
+def problems() -> list[str]:
+    """What is wrong with packages that bring stages or sources, in words."""
+    return [*STAGES.problems(), *SOURCES.problems()]
 
 
 _TYPE_NAME = re.compile(r"[-\[]")

@@ -1,8 +1,7 @@
 """The words that runs, stages and sources share: raw messages, channels, bundles, stages.
 
-A stage is one file in `stages/` with a `Stage` named STAGE; no other file knows it by name. What is set with
-`--set fuse.bearing_gate=4` becomes the field `bearing_gate` of its `config`, a dataclass, and comes to its `process` as
-the second argument; `runs/plan.py` tells the way there.
+A stage is one file in `stages/`, or of another package, with a `Stage` named STAGE; no other file knows it by name.
+`--set fuse.bearing_gate=4` sets the field `bearing_gate` of its `config`, a dataclass, which its `process` gets second.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -12,6 +11,7 @@ from typing import Any, ClassVar, Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from mcap_landmarks.extensions import Registry
 from mcap_landmarks.geometry.se2 import Array, between, exp, interpolate
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.codec import M, Message
@@ -93,8 +93,7 @@ class Channel(Generic[M_co]):
 class Stamped:
     """A message on its way into a recording.
 
-    `frame_id` is that of the image, scan or the like that it was made from, where its channel may have a topic for each
-    of several sensors.
+    `frame_id` is that of what it was made from, where its channel may have a topic for each of several sensors.
     """
 
     channel: Channel[Message]
@@ -243,9 +242,9 @@ class Stage:
     `thinned` lets --image-rate and --every leave out some of them. Channels of `reads` that are `optional`, too, are
     read where they are there, and no other stage is run to make them. A channel of `writes` gets its own topic, or the
     one that its function in `places` gives. `config` is a dataclass type. `resources` are files that the runner opens,
-    hashes and passes in, `options` files that may be missing; a resource with a function in
-    `choices` is what that gives, whether the user gave one or not. `tolerance` says how far each field, by the name
-    that `diff` gives it, may differ between two machines; a number is absolute.
+    hashes and passes in, `options` may be missing; what a function in `choices` makes of what was given counts.
+    `tolerance` says how far each field of `diff` may be off on another machine; a number is absolute. What packages
+    bring to the registries `extensible` takes part in the results.
     """
 
     name: str
@@ -260,6 +259,7 @@ class Stage:
     options: tuple[str, ...] = ()
     choices: Mapping[str, Choose] = field(default_factory=dict)
     tolerance: Mapping[str, float | Tolerance] = field(default_factory=dict)
+    extensible: tuple[Registry[object], ...] = ()
 
     @property
     def required(self) -> tuple[Channel[Message], ...]:

@@ -3,7 +3,7 @@
 import typer
 
 from mcap_landmarks.cli import options
-from mcap_landmarks.cli.console import say, say_json
+from mcap_landmarks.cli.console import say, say_json, warn
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -16,10 +16,12 @@ def show(
     json: options.Json = False,
 ) -> None:
     """Print the configuration that is in force, defaults included, as TOML that --config takes."""
-    from mcap_landmarks.config import gather
+    from mcap_landmarks.config import gather, problems
     from mcap_landmarks.runs.config_text import everything, toml
 
     tables = everything(gather(config_file, settings or [], method))
+    for problem in problems():
+        warn(f"warning: {problem}")
     if json:
         say_json("config_show", {"config": tables})
     else:

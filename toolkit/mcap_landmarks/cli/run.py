@@ -15,12 +15,18 @@ if TYPE_CHECKING:
     from mcap_landmarks.runs.pipeline import LogRun
 
 
+def _stages_help() -> str:
+    """The help of --stages: which there are, those of installed packages included; nothing of them is loaded."""
+    from mcap_landmarks.extensions import names_in
+
+    brought = names_in("mcap_landmarks.stages")
+    return f"Stages, such as detect,cluster,fuse,localize{'; installed are ' * bool(brought)}{', '.join(brought)}."
+
+
 @reading_logs
 def command(
     logs: Annotated[list[Location], typer.Argument(metavar="LOG...", parser=location, help="Recordings (MCAP).")],
-    stages: Annotated[
-        str, typer.Option("--stages", metavar="NAME,...", help="Stages, such as detect,cluster,fuse,localize.")
-    ],
+    stages: Annotated[str, typer.Option("--stages", metavar="NAME,...", help=_stages_help())],
     output: options.Output,
     images: ImageOptions,
     scans: ScanOptions,

@@ -7,7 +7,7 @@ from difflib import get_close_matches
 from mcap_landmarks.diff.maps import FIELDS as MAP_FIELDS
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.stage import Reduction, Tolerance
-from mcap_landmarks.stages import find_stage, stage_names
+from mcap_landmarks.stages import usable_stages
 
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _VALUE = re.compile(rf"(?P<absolute>{_NUMBER})?(?:(?(absolute)\+)(?P<percent>{_NUMBER})%)?")
@@ -21,7 +21,7 @@ def declared() -> Declared:
     Of two stages that write a topic the wider one counts.
     """
     found: dict[str, dict[str, Tolerance]] = {}
-    for stage in map(find_stage, stage_names()):
+    for stage in usable_stages():
         fields = {
             name: value if isinstance(value, Tolerance) else Tolerance(float(value))
             for name, value in stage.tolerance.items()

@@ -7,9 +7,7 @@ from collections.abc import Mapping
 from pydantic import TypeAdapter
 from pydantic.json_schema import JsonSchemaValue
 
-from mcap_landmarks.config import Settings, declaration, effective, stage_config
-from mcap_landmarks.sources import source_names
-from mcap_landmarks.stages import stage_names
+from mcap_landmarks.config import Settings, declaration, effective, stage_config, usable_names
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -17,7 +15,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 def everything(settings: Settings) -> dict[str, dict[str, object]]:
     """Every key of every stage and source that has any, with the value in force; None is unset."""
     found = {}
-    for name in (*stage_names(), *source_names()):
+    for name in usable_names():
         made, given = declaration(name), settings.get(name, {})
         own = {key: value for key, value in given.items() if key not in made.files}
         files = {key: given.get(key) for key in made.files}
@@ -62,7 +60,7 @@ def toml_value(value: object) -> str:
 
 def json_schema() -> JsonSchemaValue:
     """JSON schema of a configuration file."""
-    made = {name: declaration(name) for name in (*stage_names(), *source_names())}
+    made = {name: declaration(name) for name in usable_names()}
     adapters = [(name, "validation", TypeAdapter(entry.config)) for name, entry in made.items()]
     by_name, rest = TypeAdapter.json_schemas(adapters)  # type: ignore[arg-type] # a literal in a tuple
     definitions = {name: _closed(entry) for name, entry in sorted(rest.get("$defs", {}).items())}

@@ -9,7 +9,7 @@ from mcap_landmarks.inspection.topic_roles import ROLES, could_be
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.runs.recorded_log import RecordedLog
 from mcap_landmarks.stage import Channel, Reduction, Stage
-from mcap_landmarks.stages import find_stage, stage_names
+from mcap_landmarks.stages import find_stage, stage_names, usable_stages
 
 
 def missing_stages(stage: Stage | Reduction, log: RecordedLog, use: Collection[str] = ()) -> list[str]:
@@ -53,8 +53,7 @@ def _chain_for(channel: Channel[Message], log: RecordedLog, use: Collection[str]
 def _producers(channel: Channel[Message], use: Collection[str]) -> list[Stage]:
     """The stages that write a channel, only those in `use` if there are any."""
     asked = [_stage(name) for name in use]
-    stages = [find_stage(name) for name in stage_names()]
-    found = [stage for stage in stages if isinstance(stage, Stage) and channel in stage.writes]
+    found = [stage for stage in usable_stages() if isinstance(stage, Stage) and channel in stage.writes]
     if not found:
         raise UsageError(f"{channel.topic}: no stage writes it; read another topic as it with --remap")
     return [stage for stage in found if stage in asked] or found

@@ -15,13 +15,13 @@ from mcap_landmarks.inspection.camera_checks import refuse_cameras
 from mcap_landmarks.inspection.time_offsets import OFFSET_ROLES
 from mcap_landmarks.inspection.topic_roles import ROLES, Choice
 from mcap_landmarks.locations import Location
-from mcap_landmarks.manifest import RECORDING, StageRecord, code_hash, file_hash, is_generated
+from mcap_landmarks.manifest import RECORDING, StageRecord, code_hash, entry_text, file_hash, is_generated, text_hash
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.runs.bundles import Span
 from mcap_landmarks.runs.recorded_log import RecordedLog
 from mcap_landmarks.runs.thinning import Thinning
 from mcap_landmarks.stage import Channel, Config, Reduction, Stage
-from mcap_landmarks.stages import find_stage
+from mcap_landmarks.stages import STAGES, find_stage
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +164,14 @@ def record_of(
         ToolkitError: a file cannot be read.
     """
     hashes = {name: file_hash(path) for name, path in sorted(files.items())}
-    return StageRecord(stage.name, code_hash(), effective(config), hashes, inputs, options)
+    return StageRecord(stage.name, _code(stage), effective(config), hashes, inputs, options)
+
+
+def _code(stage: Stage | Reduction) -> str:
+    """The hash of the toolkit's sources, and of what packages bring that takes part in a stage's results."""
+    extensible = stage.extensible if isinstance(stage, Stage) else ()
+    brought = [STAGES.code(stage.name), *(registry.code() for registry in extensible)]
+    return text_hash(entry_text([code_hash(), brought])) if any(brought) else code_hash()
 
 
 def _options(stage: Stage, request: Request) -> dict[str, object]:

@@ -1,10 +1,9 @@
-"""Foreign formats, one file each, of one shape; found by name, and imported only when asked for."""
+"""Foreign formats: one file each, of one shape, and those that packages bring; found by name, imported when asked."""
 
-import importlib
-import pkgutil
 from pathlib import Path
 
 from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.extensions import Registry
 from mcap_landmarks.sources._bag_metadata import recorded_metadata
 from mcap_landmarks.sources._definition_files import definition_files
 from mcap_landmarks.sources._foxglove_types import counterpart
@@ -23,17 +22,23 @@ from mcap_landmarks.sources._shape import (
 )
 from mcap_landmarks.sources._verification import defined, settled
 
+SOURCES: Registry[Source] = Registry(
+    "source", "sources", "SOURCE", (Source,), "mcap_landmarks.sources", beside="stages"
+)
+
 
 def source_names() -> tuple[str, ...]:
-    """Every source in this folder; files whose name begins with an underscore are parts of sources."""
-    return tuple(sorted(entry.name for entry in pkgutil.iter_modules(__path__) if not entry.name.startswith("_")))
+    """Every source in this folder and of packages; files whose name begins with an underscore are parts of sources."""
+    return SOURCES.names()
 
 
 def find_source(name: str) -> Source:
-    """The declaration of a source, imported now."""
-    source = importlib.import_module(f"{__name__}.{name}").SOURCE
-    assert isinstance(source, Source)  # noqa: S101 - a contract of this folder, held by tests/contract
-    return source
+    """The declaration of a source, imported now.
+
+    Raises:
+        ExtensionError: the package that brings it cannot be used.
+    """
+    return SOURCES.find(name)
 
 
 def source_of(path: Path) -> Source:
@@ -44,18 +49,19 @@ def source_of(path: Path) -> Source:
     """
     if not path.exists():
         raise RecordingError(f"{path}: there is no such file or folder; check the path")
-    known = [find_source(name) for name in source_names()]
+    known = [SOURCES.own(name) for name in SOURCES.usable()]
     try:
         for source in known:
             if source.recognises(path):
                 return source
     except PermissionError as error:
         raise RecordingError(f"{path} may not be read; change its permissions") from error
-    formats = "; ".join(source.reads for source in known)
+    formats = "; ".join([*(source.reads for source in known), *SOURCES.problems()])
     raise RecordingError(f"{path} is nothing that can be converted; known are: {formats}")
 
 
 __all__ = [
+    "SOURCES",
     "BagDescription",
     "Carried",
     "Log",

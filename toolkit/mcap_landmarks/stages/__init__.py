@@ -1,18 +1,27 @@
-"""The stages: one file each, of one shape; found by name, and imported only when asked for."""
+"""The stages: one file each, of one shape, and those that packages bring; found by name, imported when asked for."""
 
-import importlib
-import pkgutil
-
+from mcap_landmarks.extensions import Registry
 from mcap_landmarks.stage import Reduction, Stage
+
+STAGES: Registry[Stage | Reduction] = Registry(
+    "stage", "stages", "STAGE", (Stage, Reduction), "mcap_landmarks.stages", beside="sources"
+)
 
 
 def stage_names() -> tuple[str, ...]:
-    """Every stage in this folder; files whose name begins with an underscore are parts of stages."""
-    return tuple(sorted(entry.name for entry in pkgutil.iter_modules(__path__) if not entry.name.startswith("_")))
+    """Every stage in this folder and of packages; files whose name begins with an underscore are parts of stages."""
+    return STAGES.names()
 
 
 def find_stage(name: str) -> Stage | Reduction:
-    """The declaration of a stage, imported now."""
-    stage = importlib.import_module(f"{__name__}.{name}").STAGE
-    assert isinstance(stage, Stage | Reduction)  # noqa: S101 - a contract of this folder, held by tests/contract
-    return stage
+    """The declaration of a stage, imported now.
+
+    Raises:
+        ExtensionError: the package that brings it cannot be used.
+    """
+    return STAGES.find(name)
+
+
+def usable_stages() -> list[Stage | Reduction]:
+    """The declarations of all stages; of packages' those that can be used."""
+    return [STAGES.own(name) for name in STAGES.usable()]

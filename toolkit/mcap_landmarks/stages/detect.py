@@ -19,6 +19,7 @@ from mcap_landmarks.vision.classifier import Classifier, open_classifier
 from mcap_landmarks.vision.config import THESIS_SIZE_PX, DetectConfig
 from mcap_landmarks.vision.detection import Found, Prepared, find, prepare, thresholds
 from mcap_landmarks.vision.detector import Detector, read_detector
+from mcap_landmarks.vision.families import FAMILIES
 from mcap_landmarks.vision.onnx_session import open_session
 from mcap_landmarks.vision.pixels import Rgb, rgb_from_message
 from mcap_landmarks.vision.prefetch import in_order
@@ -127,4 +128,5 @@ STAGE = Stage(
     options=("names", "classifier"),
     choices={"model": choose_network},
     tolerance={"box_xyxy_px": 0.5, "score": 1e-4, "others.score": 1e-4, "points.points": 0.5, "texts.position": 0.5},
+    extensible=(FAMILIES,),
 )

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mcap_landmarks.errors import ModelError, UsageError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.vision.config import DetectConfig
-from mcap_landmarks.vision.families import family_names, find_family
+from mcap_landmarks.vision.families import FAMILIES, family_names, find_family
 from mcap_landmarks.vision.family import DetectionCandidates, Family, ModelLayout, Signature
 from mcap_landmarks.vision.metadata import confidence_of, names_of
 from mcap_landmarks.vision.onnx_session import FLOATS, OnnxSession, fits, written
@@ -91,12 +91,12 @@ def _asked_for(name: str | None, signature: Signature) -> tuple[str, ...]:
     if name is not None and name not in known:
         raise UsageError(f"detect.family = {name}: there is no such family of detectors; there are {', '.join(known)}")
     only = name or signature.stated
-    return (only,) if only in known else known
+    return (only,) if only in known else FAMILIES.usable()
 
 
 def _recognised(signature: Signature, names: tuple[str, ...]) -> tuple[Family, ModelLayout]:
     found, expected = [], []
-    for family in map(find_family, names):
+    for family in map(find_family if len(names) == 1 else FAMILIES.own, names):
         layout = family.recognise(signature)
         if isinstance(layout, ModelLayout):
             found.append((family, layout))

@@ -1,18 +1,23 @@
-"""The detector families: one file each, of one shape; found by name, and imported when a model is opened."""
+"""The detector families: one file each, of one shape, and those that packages bring; found by name.
 
-import importlib
-import pkgutil
+They are imported when a model is opened.
+"""
 
+from mcap_landmarks.extensions import Registry
 from mcap_landmarks.vision.family import Family
+
+FAMILIES = Registry("family of detectors", "vision/families", "FAMILY", (Family,), "mcap_landmarks.detectors")
 
 
 def family_names() -> tuple[str, ...]:
-    """Every family in this folder; files whose name begins with an underscore are parts of families."""
-    return tuple(sorted(entry.name for entry in pkgutil.iter_modules(__path__) if not entry.name.startswith("_")))
+    """Every family in this folder and of packages; files that begin with an underscore are parts of families."""
+    return FAMILIES.names()
 
 
 def find_family(name: str) -> Family:
-    """The declaration of a family, imported now."""
-    family = importlib.import_module(f"{__name__}.{name}").FAMILY
-    assert isinstance(family, Family)  # noqa: S101 - a contract of this folder, held by tests/contract
-    return family
+    """The declaration of a family, imported now.
+
+    Raises:
+        ExtensionError: the package that brings it cannot be used.
+    """
+    return FAMILIES.find(name)
