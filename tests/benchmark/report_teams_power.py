@@ -1,9 +1,9 @@
 """How often verdicts over 20 logs are right: `python -m tests.benchmark.report_teams_power [--json] [--quick]`.
 
 Simulated pairs of sets of runs: logs' errors differ by a factor of 3 (RMSE of 2 to 6 cm, log-uniform), as between an
-easy drive and a hard one. Of one set to the other the position's RMSE changes by 5 % in each log, up or down, or not at
-all, and every metric that gates has noise of its own from pair to pair. That noise decides what can be seen, so it is
-drawn at several sizes. `measured_noise` is what `tests.benchmark.pair_noise` finds between real runs.
+easy drive and a hard one. From one set to the other the position's RMSE changes by 5 % in each log, up or down, or not
+at all, and every metric that gates has noise of its own from pair to pair. That noise decides what can be seen, so it
+is drawn at several sizes.
 """
 
 import sys
@@ -16,9 +16,11 @@ from mcap_landmarks.diff.verdicts import Sides, verdicts
 from tests.benchmark.rows import Row, main
 
 LOGS, DRAWS, CHANGE = 20, 1000, 0.05
-NOISE = 0.02
-"""What the goals are held at."""
-LEVELS = (0.01, 0.02, 0.05, 0.1)
+NOISE = 0.025
+"""What the goals are held at, measured: by so much the change of the RMSE spreads (standard deviation of its logarithm)
+over stretches of 30 bundles of the two bundled recordings, both localized in one map with `cluster.sigma_m` of 1.0 and
+of 1.1 cm. It is 0.6 % in the one and 4.4 % in the other; other settings left all results as they were, to the byte."""
+LEVELS = (0.01, 0.02, NOISE, 0.05, 0.1)
 CHANGED, UNCHANGED = "position.rmse_m", "heading.rmse_deg"
 CALLED = {"better", "worse", "changed"}
 

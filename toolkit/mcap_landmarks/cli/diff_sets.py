@@ -127,7 +127,7 @@ def _print_left_out(document: "SetDocument") -> None:
 
 
 def _print_verdicts(metrics: "dict[str, VerdictEntry]") -> None:
-    from mcap_landmarks.diff.set_text import change_of, confidence_of, interval_of, margin_of, telling, value_of
+    from mcap_landmarks.diff.set_text import change_in, confidence_of, interval_of, margin_of, telling, value_of
 
     shown, others = telling(metrics)
     head = ["verdict", "confidence", "baseline", "candidate", "change", "between", "margin", "logs"]
@@ -139,7 +139,7 @@ def _print_verdicts(metrics: "dict[str, VerdictEntry]") -> None:
                 confidence_of(entry),
                 value_of(entry["baseline"]),
                 value_of(entry["candidate"]),
-                change_of(entry["change"], relative=entry["relative"]),
+                change_in(entry),
                 interval_of(entry),
                 margin_of(entry),
                 str(entry["logs"]),
@@ -150,10 +150,11 @@ def _print_verdicts(metrics: "dict[str, VerdictEntry]") -> None:
         if rows:
             say()
             table([title, *head], rows)
+        for note in dict.fromkeys(metrics[name]["note"] for name, *_ in rows):
+            if note:
+                say(f"  {note}")
     if others:
         say(f"  the same: {', '.join(others)}")
-    for note in dict.fromkeys(entry["note"] for entry in metrics.values() if entry["note"]):
-        say(f"  {note}")
     for name, entry in metrics.items():
         if entry["lost"]:
             say(f"  {name}: of {counted(entry['lost'], 'log')} the baseline has it and the candidate does not")

@@ -48,7 +48,8 @@ def read_log(path: Location, progress: Progress | None = None) -> ReadLog:
     """
     run, truth, losses = read_run(path, progress)
     if not run.bundles and not len(run.trajectory) and run.landmarks is None:
-        raise RecordingError(f"{path}: has no results; run localize on it first")
+        remedy = f"it is damaged ({'; '.join(losses)})" if losses else "run localize on it first"
+        raise RecordingError(f"{path}: has no results; {remedy}")
     with open_recording(path) as recording:
         lists = {channel.topic: _items(recording, channel) for channel in (DETECTIONS, SCENE_OBJECTS)}
         losses = list(dict.fromkeys([*losses, *recording.losses]))

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from mcap_landmarks.diff.set_document import SetDocument
 from mcap_landmarks.diff.set_text import (
-    change_of,
+    change_in,
     confidence_of,
     failures_of,
     interval_of,
@@ -59,7 +59,7 @@ def _metrics(document: SetDocument) -> list[str]:
             confidence_of(entry),
             value_of(entry["baseline"]),
             value_of(entry["candidate"]),
-            change_of(entry["change"], relative=entry["relative"]),
+            change_in(entry),
             interval_of(entry),
             margin_of(entry),
             str(entry["logs"]),
@@ -67,7 +67,8 @@ def _metrics(document: SetDocument) -> list[str]:
         for name, entry in ((name, metrics[name]) for name in shown)
     ]
     head = ["metric", "verdict", "confidence", "baseline", "candidate", "change", "between", "margin", "logs"]
-    notes = list(dict.fromkeys(entry["note"] for entry in metrics.values() if entry["note"]))
+    gating = [metrics[name]["note"] for name in shown if metrics[name]["gates"]]
+    notes = [note for note in dict.fromkeys(gating) if note]
     if others:
         notes.append(f"the same: {', '.join(map(code, others))}")
     return [*_table(head, rows), *(f"- {note}" for note in notes), *([""] if notes else [])]

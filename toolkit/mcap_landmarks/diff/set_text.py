@@ -19,10 +19,16 @@ def change_of(change: float, *, relative: bool) -> str:
     return f"{100 * change:+.2f} %" if relative else f"{change:+.4g}"
 
 
+def change_in(entry: VerdictEntry) -> str:
+    """By how much a metric changed; of one that is best at 1, how far it is from that."""
+    away = " from 1" if entry["direction"] == "one" else ""
+    return change_of(entry["change"], relative=entry["relative"]) + away
+
+
 def interval_of(entry: VerdictEntry) -> str:
     """Between what the change lies."""
     if entry["low"] is None or entry["high"] is None:
-        return "anything"
+        return "unbounded"
     relative = entry["relative"]
     low = change_of(entry["low"], relative=relative).removesuffix(" %")
     return f"{low} and {change_of(entry['high'], relative=relative)}"
@@ -66,7 +72,7 @@ def left_out_of(document: SetDocument) -> list[tuple[str, str]]:
 
 def verdict_of(entry: VerdictEntry) -> str:
     """A verdict in one line."""
-    change = f"{change_of(entry['change'], relative=entry['relative'])} (between {interval_of(entry)})"
+    change = f"{change_in(entry)} (between: {interval_of(entry)})"
     values = f"median {value_of(entry['baseline'])} -> {value_of(entry['candidate'])}"
     notes = [f"; {entry['note']}"] if entry["note"] else []
     notes += [f"; {counted(entry['lost'], 'log')} lost it"] if entry["lost"] else []

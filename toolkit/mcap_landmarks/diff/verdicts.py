@@ -106,8 +106,8 @@ def _judge_together(family: Mapping[str, VerdictEntry], pairs: Sequence[Sides], 
     tested = [name for name in family if any(_changes(name, pairs))]
     for name, p_value in zip(tested, holm([family[name]["p_change"] for name in tested]), strict=True):
         family[name]["p_change"] = p_value
-    for name, entry in family.items():
-        _judge(entry, criteria, len(tested) if name in tested else 1)
+    for entry in family.values():
+        _judge(entry, criteria, max(len(tested), 1))
 
 
 def _judge(entry: VerdictEntry, criteria: Criteria, together: int) -> None:
