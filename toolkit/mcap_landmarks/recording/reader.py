@@ -11,6 +11,7 @@ from typing import BinaryIO, TypeVar
 from mcap import records
 from mcap.exceptions import McapError
 
+from mcap_landmarks import memory
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, STAGE, carried_fingerprint
 from mcap_landmarks.messages.gathering import empty_table
@@ -64,6 +65,7 @@ def open_recording(
     Raises:
         RecordingError: there is no such file, or it is not an MCAP file.
     """
+    memory.keep_room()
     with open_stream(path) as stream:
         index = known or index_of(path, stream, from_front=from_front or _from_front.get(), progress=progress)
         yield Recording(path, stream, index, verify=verify)

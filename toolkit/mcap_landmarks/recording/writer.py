@@ -7,6 +7,7 @@ from typing import BinaryIO
 
 from mcap import records
 
+from mcap_landmarks import memory
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.channels import MAP, MAP_MARKERS, MAP_PATH, TF_STATIC, TRUTH_OBJECTS
 from mcap_landmarks.locations import Location
@@ -60,6 +61,7 @@ def create_recording(
     Raises:
         UsageError, RecordingError: the file cannot be written; nothing is left behind.
     """
+    memory.keep_room()
     with atomic_file(path) as stream:
         form = form or ChunkForm("lz4" if is_passing else "zstd", is_for_images=False)
         writer = RecordingWriter(stream, form, profile=profile, carried=carried)
