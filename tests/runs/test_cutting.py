@@ -21,8 +21,10 @@ from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.runs.bundles import Span
 from mcap_landmarks.runs.convert import convert
+from mcap_landmarks.runs.output_formats import OutputForm
 from mcap_landmarks.runs.pipeline import LogRun, run_stages
 from mcap_landmarks.runs.plan import Request
+from mcap_landmarks.runs.splitting import Split
 from mcap_landmarks.runs.topic_selection import Selection
 from mcap_landmarks.stage import Connection, RawMessage, Stamped
 
@@ -188,6 +190,26 @@ def test_conversion_cuts_the_same_way(here: Path) -> None:
     assert done.declared == done.topics.total()
     only = convert([here / "log.mcap"], here / "scans.mcap", Selection(("/scan",), START_NS), {}, unwatched)
     assert only.outputs[0].notes == []
+
+
+def test_the_parts_of_a_split_begin_as_cuts_at_their_starts_do(tmp_path: Path) -> None:
+    """Each holds what the one before held, and what came since: frames are told at different rates, some but once."""
+    log, parts, names = tmp_path / "log.mcap", tmp_path / "parts", ["a", "b", "c", "d", "e"]
+    frames = [(i, names[: 1 + i // 10] if i % 7 == 0 else [names[i * i % 3]]) for i in range(40)]
+    moved = [
+        Stamped(TF, i * STEP_NS, TFMessage(tuple(Transform.planar(i, ("base", one), (i, 0, 0)) for one in ones)))
+        for i, ones in frames
+    ]
+    write_log(log, moved)
+    form = OutputForm(Split(duration_ns=9 * STEP_NS))
+    outputs = convert([log], parts, Selection(), {}, unwatched, form=form).outputs
+    assert len(outputs) == 5
+    for number, output in enumerate(outputs):
+        alone = tmp_path / "alone.mcap"
+        within = (9 * number * STEP_NS or None, 9 * (number + 1) * STEP_NS)
+        convert([log], alone, Selection((), *within), {}, unwatched, overwrite=True)
+        both = [[raw[1:] for raw in of_topic(path, TF.topic)] for path in (output.path, alone)]
+        assert both[0] == both[1]
 
 
 def test_what_a_ros_1_bag_latched_comes_along_unless_nothing_follows(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from mcap_landmarks.errors import MessageError
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.images import CameraInfo
 from mcap_landmarks.messages.qos import KEY, is_latched
-from mcap_landmarks.messages.transforms import TFMessage
+from mcap_landmarks.messages.transforms import TFMessage, child_frames_in
 from mcap_landmarks.stage import Connection, RawMessage
 
 _LOG_TYPES = frozenset({"rcl_interfaces/msg/Log", "rosgraph_msgs/msg/Log"})
@@ -43,7 +43,9 @@ def latest(raws: Iterable[RawMessage], start_ns: int) -> list[RawMessage]:
     """
     holding: dict[tuple[Connection, str], tuple[int, RawMessage]] = {}
     for order, raw in enumerate(raws):
-        kept = raw._replace(log_time_ns=start_ns, data=bytes(raw.data))  # a copy: a view would hold its whole chunk
+        connection, _, publish_time_ns, sequence, data = raw
+        # A copy of the payload: a view would hold its whole chunk.
+        kept = RawMessage(connection, start_ns, publish_time_ns, sequence, bytes(data))
         for part in _parts(raw):
             holding[raw.connection, part] = order, kept
     by_order = dict(holding.values())
@@ -54,6 +56,8 @@ def _parts(raw: RawMessage) -> Iterable[str]:
     """What a message says something of: the child frames of transforms, none if they cannot be read."""
     if raw.connection.message_type != TFMessage.ROS_TYPE:
         return ("",)
+    if (frames := child_frames_in(raw.data)) is not None:
+        return frames
     try:
         return {transform.child_frame_id for transform in decode(TFMessage, raw.data).transforms}
     except MessageError:

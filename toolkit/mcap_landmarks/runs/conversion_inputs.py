@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.inspection.mcap_log import McapLog
@@ -48,6 +49,7 @@ class ConversionInputs:
         left_out = (one for log in logs for one in log.left_out)
         self.left_out = together(one for one in left_out if selection.wants(one.topic, one.message_type))
         self.declared: Counter[Connection] = Counter()
+        self._held: tuple[int | None, list[RawMessage]] = (None, [])
         self._unified = self._unify()
         if self.left_out and (strict or not self._unified):
             raise RecordingError(f"{self.where}: {'; '.join(one.told for one in self.left_out)}")
@@ -152,11 +154,14 @@ class ConversionInputs:
             yield raw._replace(connection=self._unified[raw.connection])
 
     def before(self, start_ns: int) -> list[RawMessage]:
-        """What holds at a start because of messages before it."""
+        """What holds at a start because of messages before it; of those before an earlier start, what held at that."""
         holding = set(latched(self._unified.values()))
         held = [connection for connection, own in self._unified.items() if own in holding]
-        raws = self._messages(held, None, start_ns)
-        return latest((raw._replace(connection=self._unified[raw.connection]) for raw in raws), start_ns)
+        since_ns, known = self._held if self._held[0] is None or self._held[0] <= start_ns else (None, [])
+        raws = self._messages(held, since_ns, start_ns)
+        later = (raw._replace(connection=self._unified[raw.connection]) for raw in raws)
+        self._held = start_ns, latest(chain(known, later), start_ns)
+        return self._held[1]
 
     def stretches(self, *, by_message: bool) -> Iterator[TimedBytes]:
         """The bytes of the messages in the time range, by time; of whole chunks, unless each message is asked for."""
