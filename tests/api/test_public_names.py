@@ -35,3 +35,9 @@ def test_importing_the_package_loads_nothing() -> None:
     )
     shown = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
     assert shown.stdout.strip() == "[]"
+
+
+def test_logs_come_with_the_toolkit() -> None:
+    assert ml.example_log("demo_map").is_file()
+    with pytest.raises(ml.UsageError, match="there are demo_map and demo_localize"):
+        ml.example_log("demo")

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         UsageError,
     )
     from mcap_landmarks.maps.model import LandmarkMap
+    from mcap_landmarks.resources import example_log
     from mcap_landmarks.runs.map_results import MapRun
     from mcap_landmarks.runs.pipeline import LogRun
     from mcap_landmarks.structured import StructuredArray
@@ -52,6 +53,7 @@ __all__ = [
     "build_map",
     "diff",
     "evaluate",
+    "example_log",
     "localize",
     "open_log",
     "run",
@@ -72,6 +74,7 @@ _MODULES = {
     "build_map": "api.verb_calls",
     "diff": "api.verb_calls",
     "evaluate": "api.verb_calls",
+    "example_log": "resources",
     "localize": "api.verb_calls",
     "open_log": "api.log_reader",
     "run": "api.verb_calls",

@@ -151,7 +151,7 @@ def _code(entry: EntryPoint) -> str:
     """A hash over the package of an entry point: its name and version, and the content of its files."""
     digest = hashlib.sha256(_told(entry).encode())
     for path, name in _files(entry):
-        content = path.read_bytes()
+        content = path.read_bytes() if path.is_file() else b""
         digest.update(f"{name}\0{len(content)}\0".encode() + content)
     return digest.hexdigest()
 

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
-from mcap_landmarks.errors import ToolkitError
+from mcap_landmarks.errors import ToolkitError, UsageError
 
 _PACKAGE = Path(__file__).resolve().parent
+_EXAMPLES = ("demo_map", "demo_localize")
 
 
 def resource(folder: str, name: str) -> Path:
@@ -32,3 +33,14 @@ def detector() -> Path:
     if path.exists():
         return path
     raise ToolkitError(f"{path.name} is missing from the installation; reinstall mcap-landmarks, or give --model FILE")
+
+
+def example_log(name: str) -> Path:
+    """A small recording that comes with the toolkit, `demo_map` or `demo_localize`: two drives through one place.
+
+    Raises:
+        UsageError: there is none of this name.
+    """
+    if name not in _EXAMPLES:
+        raise UsageError(f"{name} is no log that comes with the toolkit; there are {' and '.join(_EXAMPLES)}")
+    return resource("recordings", f"{name}.mcap")
