@@ -89,12 +89,14 @@ def test_what_is_not_compared_is_named(sets: Path, capsys: pytest.CaptureFixture
     cut = after / "drive_2.mcap"
     cut.write_bytes(cut.read_bytes()[:-300])
     (after / "text.mcap").write_text("no recording")
+    (after / "map.db").touch()
     result(after / "new.mcap", 77)
     assert run(sets / "before", after) == USAGE
     told = capsys.readouterr()
     for text in ("of a part of the logs", "not compared: 4", "fails: drive_1: missing in the candidate"):
         assert text in told.out, told.out
     assert "drive_2.mcap: the file is cut" in told.err
+    assert "maps are compared one by one, and map.db not at all here" in told.err
     assert "text.mcap is not an MCAP file" in told.err
     found = document(capsys, sets / "before", after)
     assert found["unpaired"] == {"baseline": ["drive_1"], "candidate": ["new"]}
@@ -145,6 +147,16 @@ def test_blessed_results_stand_for_the_logs(sets: Path, capsys: pytest.CaptureFi
     assert run(sets / "after", "--baseline", blessed, "--bless") == DONE
     assert run(sets / "after", "--baseline", blessed) == DONE
     assert first != (blessed / "blessed.json").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "text", ["{", "[]", '{"schema": "x/1"}', '{"schema": "mcap-landmarks/blessed/1", "logs": [{}]}']
+)
+def test_what_is_not_blessed_is_refused(text: str, sets: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (sets / "blessed").mkdir()
+    (sets / "blessed" / "blessed.json").write_text(text)
+    assert run(sets / "after", "--baseline", sets / "blessed") == USAGE
+    assert "bless" in capsys.readouterr().err
 
 
 def test_only_whole_results_are_blessed(sets: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -71,11 +71,19 @@ def diff_folders(
         say_json("diff_sets", document)
     else:
         _print(document)
-    for broken in document["broken"]:
-        warn(f"error: {broken['error']}")
+    _warn((baseline, candidate), document)
     if document["broken"]:
         return USAGE
     return DIFFERENT if document["fails"] else DONE
+
+
+def _warn(folders: "Sequence[Location]", document: "SetDocument") -> None:
+    for folder in folders:
+        maps = sorted(path.name for path in to_read(folder).rglob("*.db"))
+        if maps:
+            warn(f"note: {folder}: maps are compared one by one, and {short(', '.join(maps))} not at all here")
+    for broken in document["broken"]:
+        warn(f"error: {broken['error']}")
 
 
 def _write(given: SetOptions, document: "SetDocument") -> None:

@@ -4,8 +4,9 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.errors import RecordingError, UsageError
@@ -22,7 +23,7 @@ class BlessedLog:
     name: str
     fingerprint: str | None
     manifest: Mapping[str, str]
-    figures: Mapping[str, float | None]
+    figures: Mapping[str, Annotated[float, Field(allow_inf_nan=False)] | None]
 
 
 def read_blessed(path: Path) -> list[BlessedLog]:

@@ -1,6 +1,7 @@
 """The figures of one log with results that two sets of runs are compared by, with and without truth."""
 
-from collections.abc import Iterator, Mapping
+import contextlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,15 +9,14 @@ import numpy as np
 from mcap_landmarks.channels import DETECTIONS, SCENE_OBJECTS
 from mcap_landmarks.diff.criteria import METRICS
 from mcap_landmarks.diff.metric_rows import PAIRING, flat
-from mcap_landmarks.diff.values import Array, Rows
+from mcap_landmarks.diff.values import Array
 from mcap_landmarks.errors import MessageError, RecordingError
 from mcap_landmarks.evaluation.metrics import Reference, RunResult, evaluate
 from mcap_landmarks.evaluation.read import read_run
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN
 from mcap_landmarks.messages.codec import Message
-from mcap_landmarks.messages.layout import Layout, layout_of
-from mcap_landmarks.messages.typestore import definition
+from mcap_landmarks.messages.header import count_in
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.stage import Channel
@@ -78,20 +78,12 @@ def log_figures(log: ReadLog, truth: Reference) -> dict[str, float | None]:
 def _items(recording: Recording, channel: Channel[Message]) -> float | None:
     """How many items a message of a channel has on average; those that cannot be decoded are left out."""
     connections = [one for one in recording.connections(channel.topic) if one.message_type == channel.message.ROS_TYPE]
-    layout = layout_of(channel.message.ROS_TYPE, definition(channel.message.ROS_TYPE))
-    found = [bytes(raw.data) for raw in recording.messages(connections)] if connections else []
-    counts = np.concatenate([np.zeros(0, dtype=np.int64), *_counts(layout, found)])
-    return float(counts.mean()) if len(counts) else None
-
-
-def _counts(layout: Layout, messages: list[bytes]) -> Iterator[Rows]:
-    try:
-        yield layout.table(messages).children["detections"][0]
-    except MessageError:
-        half = len(messages) // 2
-        if half:
-            yield from _counts(layout, messages[:half])
-            yield from _counts(layout, messages[half:])
+    messages, items = 0, 0
+    for raw in recording.messages(connections) if connections else ():
+        with contextlib.suppress(MessageError):
+            items += count_in(raw.data)
+            messages += 1
+    return items / messages if messages else None
 
 
 def _sigmas_m(run: RunResult) -> Array:
