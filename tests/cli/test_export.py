@@ -1,12 +1,14 @@
 """The verb export."""
 
+import json
 from pathlib import Path
 
+import jsonschema
 import pytest
 from mcap_landmarks.cli.console import DONE, PARTIAL, UNUSABLE, USAGE
 from mcap_landmarks.evaluation import tum
 
-from tests.cli.calls import call
+from tests.cli.calls import call, refused, schema_of
 from tests.diff.recordings import localized_log
 
 
@@ -39,3 +41,22 @@ def test_trouble_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert call("export", log, "--format", "csv", "-o", out) == PARTIAL
     assert "warning: " in capsys.readouterr().err
     assert out.exists()
+
+
+def test_json_tells_what_was_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = localized_log(tmp_path / "r.mcap")
+    assert call("export", log, "--format", "tum", "-o", tmp_path / "out", "--json") == DONE
+    document = json.loads(capsys.readouterr().out)
+    jsonschema.validate(document, schema_of("export"))
+    assert (document["format"], document["topic"], document["poses"]) == ("tum", "/landmarks/pose_cov", 3)
+
+
+@pytest.mark.parametrize(
+    ("form", "option"), [("rerun", "--topic"), ("rerun", "--images"), ("coco", "--child"), ("tum", "--images")]
+)
+def test_options_of_other_formats_are_refused(
+    form: str, option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = localized_log(tmp_path / "r.mcap")
+    line = refused(capsys, USAGE, "export", log, "--format", form, "-o", tmp_path / "out", option, "x")
+    assert f"{option} is not for --format {form}" in line

@@ -26,7 +26,7 @@ LINES = {
     "--junit {junit} --markdown {markdown}",
     "evaluate": "evaluate {result} --reference {reference} --tum {tum} --thesis {thesis}",
     "explain": "explain {result} --at 1 -o {output}",
-    "export": "export {result} --format tum -o {output}",
+    "export": "export {result} --format coco -o {output} --images {images}",
     "foxglove": "foxglove {result} -o {output}",
     "fuse": "fuse {logs} -o {output} --extrinsics {extrinsics} --config {config_file}",
     "generate": "generate small -o {output}",

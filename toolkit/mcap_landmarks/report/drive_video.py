@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
-from mcap_landmarks.channels import BASE_FRAME, MATCH, SCENE_OBJECTS
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.evaluation.read import read_run
 from mcap_landmarks.inspection.topic_roles import Choice
@@ -68,7 +67,7 @@ def make_video(path: Location, target: Path, form: VideoForm, progress: Callable
         raws = shown.messages(read_as, form.start_ns, form.end_ns, progress)
         count = 0
         with create_video(target, form.size, form.fps) as add:
-            for now in moments(raws, read_as, static_frames(recording), _base(view), form.fps):
+            for now in moments(raws, read_as, static_frames(recording), view.base_frame, form.fps):
                 add(pictures.draw(now))
                 count += 1
         lost = dict.fromkeys([*losses, *shown.losses])
@@ -97,9 +96,3 @@ def _shown(log: LayeredLog, view: ViewedLog, image: str | None) -> dict[Connecti
     meant = {image, *(one.topic for one in (*view.scans, *view.odometry))}
     known = readers(entry.connection for entry in log.channels if entry.count)
     return {one: message for one, message in known.items() if message not in _OF_ROLES or one.topic in meant}
-
-
-def _base(view: ViewedLog) -> str:
-    """The robot's base frame, as results name it."""
-    found = next((one for channel in (MATCH, SCENE_OBJECTS) if (one := view.on(channel.topic))), None)
-    return BASE_FRAME if found is None else view.frame(found) or BASE_FRAME

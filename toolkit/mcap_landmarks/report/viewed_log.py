@@ -7,14 +7,17 @@ from functools import cached_property
 from itertools import islice
 
 from mcap_landmarks.channels import (
+    BASE_FRAME,
     CAMERA_IMAGE,
     MAP,
     MAP_MARKERS,
     MAP_POSE,
+    MATCH,
     ODOMETRY,
     POSE,
     RESULTS,
     SCAN,
+    SCENE_OBJECTS,
     TRUTH_POSE,
     shared_namespaces,
 )
@@ -120,6 +123,12 @@ class ViewedLog:
         children = {child for _, child in self.edges}
         roots = [parent for parent, _ in self.edges if parent not in children]
         return next(iter(roots), "") or next((self.frame(one) for one in self.scans), "")
+
+    @cached_property
+    def base_frame(self) -> str:
+        """The robot's base frame, as results name it."""
+        found = (self.on(channel.topic) for channel in (MATCH, SCENE_OBJECTS))
+        return next((self.frame(one) for one in found if one is not None), "") or BASE_FRAME
 
     @cached_property
     def edges(self) -> tuple[tuple[str, str], ...]:
