@@ -33,6 +33,8 @@ _APART_M = 0.5
 """Objects farther apart than this are two, whatever their ids and classes; nearer ones need a closer look."""
 ONCE = (MAP, MAP_MARKERS, TRUTH_OBJECTS)
 """Channels of which the first message counts."""
+COLUMNAR = (PoseStamped, PoseWithCovarianceStamped, LandmarkMatch)
+"""Messages without lists of messages: their columns can be gathered without a loop over them."""
 
 
 @dataclass(slots=True)
@@ -76,21 +78,31 @@ class Collected:
             return
         if channel in ONCE:
             self._once(channel, messages[0])
-            return
+        elif channel.message in COLUMNAR:
+            self.add_table(channel, np.array(logged_ns, dtype=np.int64), table)
+        else:
+            self._scenes(table, messages)
+
+    def add_table(self, channel: Channel[Message], logged_ns: Indices, table: Table, broken: int = 0) -> None:
+        """Take messages of a type in COLUMNAR by their columns, logged at times (N,); others were `broken`.
+
+        Raises:
+            RecordingError: a pose is not finite.
+        """
+        if broken:
+            self.broken[channel.topic] += broken
         stamps = table.columns["header.stamp"].values[:, 0]
-        times = np.where(stamps == 0, np.array(logged_ns, dtype=np.int64), stamps)
+        times = np.where(stamps == 0, logged_ns, stamps)
         if len(self.clock.shifts_ns) > 1:  # each moment of the log has a time of its own
-            pairs = zip(logged_ns, times.tolist(), strict=True)
+            pairs = zip(logged_ns.tolist(), times.tolist(), strict=True)
             times = times + np.array([self.clock.shift_ns(*pair) for pair in pairs], dtype=np.int64)
         if channel.message is PoseStamped:
             self._poses(channel.topic, times, table)
         elif channel.message is PoseWithCovarianceStamped:
             full = table.columns["pose.covariance"].values.reshape(-1, 6, 6)
             self.covariances.append((times, full[:, PLANAR[0], PLANAR[1]]))
-        elif channel.message is LandmarkMatch:
-            self._matches(channel.topic, times, table)
         else:
-            self._scenes(table, messages)
+            self._matches(channel.topic, times, table)
 
     def result(self) -> RunResult:
         """What the run gave."""
@@ -183,7 +195,8 @@ def _plain(spread: Array) -> Flags:
     """Which covariances (N, 36) are finite in the plane and surely positive definite or unknown."""
     a, b, also_b, c = (spread[:, column] for column in (0, 1, 6, 7))
     unknown = (a == 0) & (b == 0) & (also_b == 0) & (c == 0)
-    found: Flags = unknown | ((a > 0) & (c > 0) & (b == also_b) & (a * c - b * b > 0) & np.isfinite(a + c))
+    symmetric = np.abs(b - also_b) <= 1e-6 * (np.abs(a) + np.abs(c))  # as `usable` has it
+    found: Flags = unknown | ((a > 0) & (c > 0) & symmetric & (a * c - b * b > 0) & np.isfinite(a + c))
     return found
 
 

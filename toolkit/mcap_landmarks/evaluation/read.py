@@ -16,7 +16,7 @@ from mcap_landmarks.channels import (
 )
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.evaluation import tum
-from mcap_landmarks.evaluation.collected import ONCE, Collected
+from mcap_landmarks.evaluation.collected import COLUMNAR, ONCE, Collected
 from mcap_landmarks.evaluation.metrics import NOWHERE, Reference, RunResult
 from mcap_landmarks.evaluation.trajectory import Trajectory
 from mcap_landmarks.locations import Location, to_read
@@ -26,7 +26,9 @@ from mcap_landmarks.maps.exchange_thesis import parse_results
 from mcap_landmarks.maps.map_message import scene_from_map
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.header import SHORTEST, stamp_in
+from mcap_landmarks.messages.layout import layout_of
 from mcap_landmarks.messages.scene import SceneObjects
+from mcap_landmarks.messages.typestore import definition_in
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.clocks import Clock, clock_of, shifts_of
 from mcap_landmarks.recording.reader import Recording, open_recording
@@ -95,6 +97,7 @@ def _collect(path: Location, channels: tuple[Channel[Message], ...], progress: P
     with open_recording(path) as recording:
         found = Collected(str(path), clock=_clock(recording))
         connections = _connections(recording, channels)
+        _add_columns(recording, connections, found)
         held: dict[tuple[Channel[Message], bytes], tuple[list[int], list[bytes]]] = {}
         for raw in recording.messages(connections, progress=progress):
             channel = connections[raw.connection]
@@ -110,6 +113,18 @@ def _collect(path: Location, channels: tuple[Channel[Message], ...], progress: P
         broken = (f"{topic}: {counted(count, 'message')} could not be decoded" for topic, count in found.broken.items())
         found.losses.extend([*broken, *recording.losses])
     return found
+
+
+def _add_columns(recording: Recording, connections: dict[Connection, Channel[Message]], found: Collected) -> None:
+    """Collect the channels whose columns can be gathered at once, and take them out of the connections."""
+    for connection, channel in list(connections.items()):
+        if channel.message in COLUMNAR:
+            ros_type = channel.message.ROS_TYPE
+            layout = layout_of(ros_type, definition_in(ros_type, _text(connection.schema)))
+            rows = recording.columns(connection, layout)
+            if rows.table.rows or rows.broken:
+                found.add_table(channel, rows.log_time_ns, rows.table, rows.broken)
+            del connections[connection]
 
 
 def _clock(recording: Recording) -> Clock:

@@ -1,7 +1,7 @@
 """One bundle of a log with results and all that led to it, for an explanation."""
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, islice
 from typing import NamedTuple, TypeVar
@@ -39,7 +39,6 @@ from mcap_landmarks.manifest import RUN, stage_records, told
 from mcap_landmarks.messages.clustered_cloud import ClusteredCloud
 from mcap_landmarks.messages.codec import M, Message, decode
 from mcap_landmarks.messages.detections import Detections
-from mcap_landmarks.messages.header import stamp_in
 from mcap_landmarks.messages.images import CameraInfo, CompressedImage, Image
 from mcap_landmarks.messages.scan import LaserScan, MultiEchoLaserScan
 from mcap_landmarks.messages.scene import SceneObjects
@@ -47,7 +46,7 @@ from mcap_landmarks.messages.velocities import SceneVelocities
 from mcap_landmarks.moments import moment
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.report.box_outcomes import LostBox, lost_boxes
-from mcap_landmarks.report.messages_around import BESIDE_NS, MessagesAround
+from mcap_landmarks.report.messages_around import BESIDE_NS, MessagesAround, nearest_of, stamp_of
 from mcap_landmarks.report.scan_points import scan_points, static_frames
 from mcap_landmarks.stage import Channel, Config, Connection, RawMessage
 from mcap_landmarks.vision.pixels import rgb_from_message
@@ -57,8 +56,7 @@ _C = TypeVar("_C", bound=Config)
 _AROUND_NS = 3 * 10**9
 """How far from the asked time the bundle may be."""
 _OF_BUNDLE = (SCENE_OBJECTS, MATCH, POSE, POSE_COVARIANCE, SCAN_OBJECTS, CLUSTERED_CLOUD, SCENE_VELOCITIES)
-_OF_CAMERAS = (DETECTIONS, CAMERA_IMAGE, CAMERA_INFO)
-_BESIDE = (*_OF_CAMERAS, SCAN)
+_BESIDE = (DETECTIONS, CAMERA_IMAGE, CAMERA_INFO, SCAN)
 
 
 class Picture(NamedTuple):
@@ -131,7 +129,7 @@ class Situations:
         Raises:
             RecordingError: there is none within three seconds.
         """
-        found = self._around(at_ns, _AROUND_NS)
+        found = self._decoded(self._raws(at_ns, _AROUND_NS))
         bundles = found.messages[MATCH] or found.messages[SCENE_OBJECTS]
         if not bundles:
             raise RecordingError(
@@ -143,18 +141,32 @@ class Situations:
 
     def of(self, stamp_ns: int, logged_ns: int) -> tuple[Situation, SensorData]:
         """The bundle of a stamp, whose messages were logged at a time; it may have nothing but what was detected."""
-        found = self._around(logged_ns, BESIDE_NS, stamp_ns)
+        found = self._decoded(self._needed(self._raws(logged_ns, BESIDE_NS), stamp_ns))
         return self._situation(found, stamp_ns), self._view(found, stamp_ns)
 
-    def _around(self, logged_ns: int, reach_ns: int, stamp_ns: int | None = None) -> MessagesAround:
-        """The messages that were logged around a time; those of other bundles than that of a stamp are passed over."""
-        found = MessagesAround({channel: {} for channel in (*_OF_BUNDLE, *_BESIDE)})
+    def _raws(self, logged_ns: int, reach_ns: int) -> list[RawMessage]:
         around = self._recording.messages(self._channels, max(0, logged_ns - reach_ns), logged_ns + reach_ns)
-        for raw in chain(self._first_infos, around):
+        return [*self._first_infos, *around]
+
+    def _needed(self, raws: Sequence[RawMessage], stamp_ns: int) -> list[RawMessage]:
+        """The messages that a bundle is told from: its own, the nearest boxes of each camera, and images beside them.
+
+        Decoding what another bundle has, and all images around, would take most of the time.
+        """
+        by_channel: dict[Channel[Message], list[RawMessage]] = {}
+        for raw in raws:
+            by_channel.setdefault(self._channels[raw.connection], []).append(raw)
+        boxes = nearest_of(by_channel.pop(DETECTIONS, []), [stamp_ns])
+        moments = [stamp_ns, *map(stamp_of, boxes)]
+        images = [nearest_of(by_channel.pop(channel, []), moments) for channel in (CAMERA_IMAGE, CAMERA_INFO)]
+        own = [raw for found in by_channel.values() for raw in found if stamp_of(raw) == stamp_ns]
+        return [*boxes, *chain.from_iterable(images), *own]
+
+    def _decoded(self, raws: Sequence[RawMessage]) -> MessagesAround:
+        found = MessagesAround({channel: {} for channel in (*_OF_BUNDLE, *_BESIDE)})
+        for raw in raws:
             channel = self._channels[raw.connection]
             with contextlib.suppress(MessageError, RecordingError):
-                if stamp_ns is not None and channel not in _OF_CAMERAS and stamp_in(raw.data) not in {0, stamp_ns}:
-                    continue
                 message = _read(raw, channel, self._images)
                 camera = self._cameras.get(raw.connection.topic, "")
                 if isinstance(message, Detections | CameraInfo):

@@ -1,13 +1,17 @@
 """The messages of a log around a moment, of which a bundle takes its own and what its sensors saw beside it."""
 
+import contextlib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from mcap_landmarks.channels import CAMERA_INFO, DETECTIONS
+from mcap_landmarks.errors import MessageError
 from mcap_landmarks.geometry.frames import plain
 from mcap_landmarks.messages.codec import M, Message
 from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.messages.header import frame_in, stamp_in
 from mcap_landmarks.messages.images import CameraInfo
-from mcap_landmarks.stage import Channel
+from mcap_landmarks.stage import Channel, Connection, RawMessage
 
 BESIDE_NS = 10**9
 """How far from a bundle what its sensors saw may be: the slowest cameras of robots give an image a second."""
@@ -46,3 +50,26 @@ class MessagesAround:
         cameras = sorted({camera for _, camera in self.messages[DETECTIONS]})
         found = {camera: self.nearest(DETECTIONS, time_ns, camera) for camera in cameras}
         return {camera: message for camera, message in found.items() if isinstance(message, Detections)}
+
+
+def stamp_of(raw: RawMessage) -> int:
+    """The stamp of a message that is not decoded; its log time where that is zero, or there is none."""
+    with contextlib.suppress(MessageError):
+        return stamp_in(raw.data) or raw.log_time_ns
+    return raw.log_time_ns
+
+
+def nearest_of(raws: Sequence[RawMessage], moments_ns: Iterable[int]) -> list[RawMessage]:
+    """Of each connection and frame the message that is nearest to each moment, the earlier one of two."""
+    groups: dict[tuple[Connection, str], list[tuple[int, RawMessage]]] = {}
+    for raw in raws:
+        groups.setdefault((raw.connection, frame_in(raw.data)), []).append((stamp_of(raw), raw))
+    return [
+        group[row][1]
+        for group in groups.values()
+        for row in {_nearest([stamp_ns for stamp_ns, _ in group], moment_ns): None for moment_ns in moments_ns}
+    ]
+
+
+def _nearest(stamps_ns: Sequence[int], moment_ns: int) -> int:
+    return min(range(len(stamps_ns)), key=lambda row: abs(stamps_ns[row] - moment_ns))

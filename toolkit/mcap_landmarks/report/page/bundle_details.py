@@ -30,12 +30,14 @@ class PictureStore:
     most_bytes: int
     urls: list[str] = field(default_factory=list)
     _places: dict[str, int] = field(default_factory=dict)
+    _first: int = 0
 
     def add(self, picture: Picture) -> int | None:
         """The place of a picture in `urls`; None where there is no image."""
         if picture.pixels is None:
             return None
-        url = data_url(picture.pixels, self.most_bytes)
+        url, step = data_url(picture.pixels, self.most_bytes, self._first)
+        self._first = max(0, step - 1)
         place = self._places.setdefault(url, len(self.urls))
         if place == len(self.urls):
             self.urls.append(url)
