@@ -1,4 +1,4 @@
-"""How often verdicts over 20 logs are right: `python -m tests.benchmark.report_teams_power [--json] [--quick]`.
+"""How often verdicts over 20 logs are right: rows of `python -m tests.benchmark.report`.
 
 Simulated pairs of sets of runs: logs' errors differ by a factor of 3 (RMSE of 2 to 6 cm, log-uniform), as between an
 easy drive and a hard one. From one set to the other the position's RMSE changes by 5 % in each log, up or down, or not
@@ -6,14 +6,13 @@ at all, and every metric that gates has noise of its own from pair to pair. That
 is drawn at several sizes.
 """
 
-import sys
 from collections.abc import Iterator
 
 import numpy as np
 from mcap_landmarks.diff.criteria import Criteria
 from mcap_landmarks.diff.verdicts import Sides, verdicts
 
-from tests.benchmark.rows import Row, main
+from tests.benchmark.rows import Row
 
 LOGS, DRAWS, CHANGE = 20, 1000, 0.05
 NOISE = 0.025
@@ -83,7 +82,3 @@ def measure(quick: bool) -> Iterator[Row]:
         # no level of noise may raise more false alarms
         yield Row(f"teams_power: false alarms, noise {percent}", called, at_most=0.05, cases=draws)
         yield Row(f"teams_power: shown to be the same, noise {percent}", same, cases=draws)
-
-
-if __name__ == "__main__":
-    sys.exit(main(measure, "How often verdicts over 20 logs are right."))
