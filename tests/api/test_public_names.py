@@ -1,6 +1,7 @@
 """The public names: small in number, quick to import, typed, and each of them there."""
 
 import ast
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -41,3 +42,10 @@ def test_logs_come_with_the_toolkit() -> None:
     assert ml.example_log("demo_map").is_file()
     with pytest.raises(ml.UsageError, match="there are demo_map and demo_localize"):
         ml.example_log("demo")
+
+
+def test_images_are_bounded_as_for_the_command_line() -> None:
+    asked = "import os, mcap_landmarks.api; print(os.environ['OPENCV_IO_MAX_IMAGE_PIXELS'])"
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("OPENCV")}
+    shown = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True, env=environment)
+    assert int(shown.stdout) == 1 << 26

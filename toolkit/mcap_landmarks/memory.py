@@ -55,6 +55,13 @@ def _half_of_all() -> int:
 
 
 @cache
+def bound_images() -> None:
+    """Bound what OpenCV decodes, before it is loaded: by itself that is up to 2**30 pixels, also of kinds of images
+    whose headers `vision` does not read.
+    """
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(1 << 26))
+
+
 def keep_room() -> None:
     """Let freed chunks leave their memory to the next ones; to get it anew takes as long as to read them.
 

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from mcap_landmarks import memory
 from mcap_landmarks.cli.console import heeding_signals, run_command
 from mcap_landmarks.cli.option_groups import spread
 from mcap_landmarks.errors import UsageError
@@ -109,8 +110,7 @@ def run(arguments: list[str] | None = None) -> None:
     # NumPy's products are of small matrices, which BLAS shares out among threads that mostly wait in a loop for each
     # other: that took a third of the processor time of clustering. It reads this when NumPy is first imported, later.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # OpenCV decodes up to 2**30 pixels by itself, and reads kinds of images whose headers `vision` does not.
-    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(1 << 26))
+    memory.bound_images()
     # Pydantic would look through all installed packages for plugins of its own.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
     given = sys.argv[1:] if arguments is None else arguments
