@@ -93,7 +93,7 @@ def test_what_is_not_compared_is_named(sets: Path, capsys: pytest.CaptureFixture
     result(after / "new.mcap", 77)
     assert run(sets / "before", after) == USAGE
     told = capsys.readouterr()
-    for text in ("of a part of the logs", "not compared: 4", "fails: drive_1: missing in the candidate"):
+    for text in ("of a part of the logs", "no pair of their own: 4", "fails: drive_1: missing in the candidate"):
         assert text in told.out, told.out
     assert "drive_2.mcap: the file is cut" in told.err
     assert "maps are compared one by one, and map.db not at all here" in told.err
@@ -102,6 +102,18 @@ def test_what_is_not_compared_is_named(sets: Path, capsys: pytest.CaptureFixture
     assert found["unpaired"] == {"baseline": ["drive_1"], "candidate": ["new"]}
     assert [(one["log"], one["side"]) for one in found["broken"]] == [("drive_2", "candidate"), ("text", "candidate")]
     assert ("drive_0", "renamed") in [(log["log"], log["candidate"]) for log in found["logs"]]
+
+
+def test_a_recording_counts_once(sets: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Copies of one log are no more witnesses than the one."""
+    for side in ("before", "after"):
+        for path in (sets / side).iterdir():
+            result(path, 0, 0.02 if path.stem == "drive_7" and side == "before" else 0.06)
+    found = document(capsys, sets / "before", sets / "after")
+    assert (found["pairs"], found["repeated"]) == (8, [f"drive_{i}" for i in range(1, 8)])
+    rmse = found["metrics"]["position.rmse_m"]
+    assert (rmse["verdict"], rmse["logs"]) == ("inconclusive", 1)
+    assert rmse["baseline"] == pytest.approx((7 * 0.06 + 0.02) / 8)
 
 
 def test_a_missing_log_fails_unless_criteria_say_otherwise(sets: Path, tmp_path: Path) -> None:
@@ -126,6 +138,7 @@ def test_criteria_for_single_logs(made: Path, tmp_path: Path, capsys: pytest.Cap
     ]
 
 
+@pytest.mark.slow
 def test_conditions_decide_alone(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sides = made / "before", made / "after"
     assert run(*sides, "--fail-on", "worst.position.rmse_m > 1") == DONE
@@ -136,6 +149,7 @@ def test_conditions_decide_alone(made: Path, capsys: pytest.CaptureFixture[str])
     assert "did you mean worst.position.rmse_m?" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_blessed_results_stand_for_the_logs(sets: Path, capsys: pytest.CaptureFixture[str]) -> None:
     blessed = sets / "blessed"
     assert document(capsys, sets / "before", "--baseline", blessed, "--bless", name="diff_bless")["logs"] == [*ERRORS_M]
@@ -167,6 +181,7 @@ def test_only_whole_results_are_blessed(sets: Path, capsys: pytest.CaptureFixtur
     assert not (sets / "blessed").exists()
 
 
+@pytest.mark.slow
 def test_truth_from_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name, truth in (("bare", False), ("truth", True)):
         (tmp_path / name).mkdir()
@@ -178,6 +193,7 @@ def test_truth_from_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert found["metrics"]["localized_share"]["verdict"] == "same"
 
 
+@pytest.mark.slow
 def test_junit_and_markdown(sets: Path, tmp_path: Path) -> None:
     evil = "a|b `x` <script>&@all\u202e\x01 #1 **bold**"
     for side in ("before", "after"):

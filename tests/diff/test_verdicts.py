@@ -94,6 +94,7 @@ def test_the_verdict_over_all_is_that_of_the_worst_that_gates() -> None:
     assert strict[RMSE]["fails"]
 
 
+@pytest.mark.slow
 def test_false_alarms_stay_below_the_level() -> None:
     """Of 400 pairs of sets that differ by noise alone; each set has two metrics that go their own ways."""
     rng, alarms = np.random.default_rng(4), 0

@@ -35,9 +35,9 @@ def command(
     Messages are paired by channel and time stamp, detections by overlap and class, objects and landmarks by position
     and class. What the manifests say was meant to differ does not count as a difference.
 
-    Of two folders, logs are paired by what was recorded, then by name, and every figure gets a verdict over all pairs:
+    Of two folders, logs are paired by what was recorded, then by name, and every metric gets a verdict over all pairs:
     same, better, worse, or inconclusive. Exit code 0: nothing that gates got worse, 1: it did, 2: an error, also where
-    a log could not be compared.
+    a log could not be compared. Two drives are compared by rates, distributions, classes, landmarks and errors.
     """
     for place in filter(None, (baseline, candidate, reference)):
         to_read(place)

@@ -121,13 +121,13 @@ def _print(document: "SetDocument") -> None:
 
 
 def _print_left_out(document: "SetDocument") -> None:
-    """What was not compared, by name."""
+    """The logs that are no pair of their own, by name."""
     from mcap_landmarks.diff.set_text import left_out_of
 
     rows = left_out_of(document)
     if rows:
         say()
-        table([f"not compared: {len(rows)}", "why"], rows)
+        table([f"no pair of their own: {len(rows)}", "why"], rows)
     by_name = [log["log"] for log in document["logs"] if log["paired_by"] == "name"]
     if by_name:
         say()

@@ -84,7 +84,7 @@ def _logs(document: SetDocument) -> list[str]:
 def _left_out(document: SetDocument) -> list[str]:
     rows = [[code(name), why] for name, why in left_out_of(document)]
     errors = [f"- {code(one['error'])}" for one in document["broken"]]
-    return [*_table(["not compared", "why"], rows), *errors, *([""] if errors else [])] if rows else []
+    return [*_table(["no pair of their own", "why"], rows), *errors, *([""] if errors else [])] if rows else []
 
 
 def _meant(document: SetDocument) -> list[str]:

@@ -74,13 +74,17 @@ class UnpairedLogs(TypedDict):
 
 
 class SetDocument(TypedDict):
-    """Everything that a comparison of two sets found; `partial` where a log could not be compared."""
+    """Everything that a comparison of two sets found; `partial` where a log could not be compared.
+
+    `repeated` are the logs of a recording that another log is of: for verdicts they count as one, with their means.
+    """
 
     verdict: Verdict
     fails: bool
     partial: bool
     confidence: float
     pairs: int
+    repeated: list[str]
     unpaired: UnpairedLogs
     missing_fails: bool
     broken: list[BrokenEntry]

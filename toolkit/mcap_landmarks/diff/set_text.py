@@ -64,9 +64,10 @@ def failures_of(document: SetDocument) -> list[tuple[str, str]]:
 
 
 def left_out_of(document: SetDocument) -> list[tuple[str, str]]:
-    """The logs that were not compared, and why."""
+    """The logs that are no pair of their own, and why."""
     found = [(name, "the candidate lacks it") for name in document["unpaired"]["baseline"]]
     found += [(name, "the baseline lacks it") for name in document["unpaired"]["candidate"]]
+    found += [(name, "joined with another log of its recording") for name in document["repeated"]]
     return found + [(one["log"], f"the {one['side']}'s cannot be read") for one in document["broken"]]
 
 

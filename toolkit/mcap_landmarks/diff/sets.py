@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal, SupportsFloat
 
@@ -63,8 +63,9 @@ def diff_sets(
         "baseline": _others("baseline", sets[0], [pair.baseline for pair in pairs], broken),
         "candidate": _others("candidate", sets[1], [pair.candidate for pair in pairs], broken),
     }
+    marks = {log.name: log.fingerprint for log in sets[0]}
     compared.sort(key=lambda one: (-one[0], one[1]["log"]))
-    document = _document(rules, [(entry, sides) for _, entry, sides in compared], unpaired, broken)
+    document = _document(rules, [(entry, sides) for _, entry, sides in compared], unpaired, broken, marks)
     document["manifest"] = _shared(rows)
     return _judged(document, conditions, alone=criteria is None)
 
@@ -139,8 +140,11 @@ def _document(
     compared: Sequence[tuple[LogEntry, Sides]],
     unpaired: UnpairedLogs,
     broken: list[BrokenEntry],
+    marks: Mapping[str, str | None],
 ) -> SetDocument:
-    metrics, logs = verdicts([sides for _, sides in compared], rules), [entry for entry, _ in compared]
+    logs = [entry for entry, _ in compared]
+    repeated = _repeated([entry["log"] for entry in logs], marks)
+    metrics = verdicts(_joined([(marks[entry["log"]], sides) for entry, sides in compared]), rules)
     missing_fails = rules.missing == "fail" and bool(unpaired["baseline"])
     failing = [entry["fails"] for entry in metrics.values()] + [bool(log["fails"]) for log in logs]
     return {
@@ -149,6 +153,7 @@ def _document(
         "partial": bool(broken),
         "confidence": rules.confidence,
         "pairs": len(compared),
+        "repeated": repeated,
         "unpaired": unpaired,
         "missing_fails": missing_fails,
         "broken": broken,
@@ -157,6 +162,35 @@ def _document(
         "logs": logs,
         "conditions": [],
     }
+
+
+def _repeated(names: Sequence[str], marks: Mapping[str, str | None]) -> list[str]:
+    """The logs of a recording that another one, the first by name, is of, too."""
+    seen, found = set[str | None](), []
+    for name in sorted(names):
+        if marks[name] is not None and marks[name] in seen:
+            found.append(name)
+        seen.add(marks[name])
+    return found
+
+
+def _joined(compared: Sequence[tuple[str | None, Sides]]) -> list[Sides]:
+    """The figures of each recording by its fingerprint: the means over its logs that have them on both sides."""
+    groups: dict[str | int, list[Sides]] = {}
+    for row, (mark, sides) in enumerate(compared):
+        groups.setdefault(row if mark is None else mark, []).append(sides)
+    return [group[0] if len(group) == 1 else _mean(group) for group in groups.values()]
+
+
+def _mean(group: Sequence[Sides]) -> Sides:
+    means: tuple[dict[str, float | None], dict[str, float | None]] = ({}, {})
+    for name in METRICS:
+        pairs = [(mine.get(name), theirs.get(name)) for mine, theirs in group]
+        both = [pair for pair in pairs if None not in pair] or pairs[:1]
+        for side, values in zip(means, zip(*both, strict=True), strict=True):
+            known = [value for value in values if value is not None]
+            side[name] = sum(known) / len(known) if known else None
+    return means
 
 
 def _shared(rows: Sequence[ManifestRow]) -> list[SharedRow]:
