@@ -30,16 +30,18 @@ def baseline(*rows: Row, where: str = HERE) -> dict[str, Entry]:
 
 
 def test_what_belongs_into_a_baseline() -> None:
-    found = baseline(*ROWS, Row("triangles", 7.0), Row("median", 0.1, "m"), Row("speed-up", 3.0, "x real time"))
+    named = Row("read_small", 9.4, "x mcap", at_least=6)
+    found = baseline(*ROWS, named, Row("triangles", 7.0), Row("median", 0.1, "m"), Row("speed-up", 3.0, "x real time"))
     assert {name: entry.better for name, entry in found.items()} == {
         "error": "lower",
         "share": "higher",
         "nees": 1.0,
         "false": "lower",
         "speed": "higher",
+        "read_small": "higher",
         "median": "lower",
     }
-    assert [name for name, entry in found.items() if entry.speed] == ["speed"]
+    assert [name for name, entry in found.items() if entry.speed] == ["speed", "read_small"]
     assert from_json(json.loads(json.dumps(as_json({"x": found})))) == {"x": found}
 
 

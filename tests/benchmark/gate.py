@@ -11,6 +11,7 @@ from typing import Any
 _ACCURACY_NOISE = 0.01
 # Two medians of the same run, while the machine may do other things.
 _SPEED_NOISE = 0.15
+# Alone, or before the name of the peer that it is relative to, as "x mcap".
 _RATIO = "x"
 _ABSOLUTE = {"s", "ms", "us", "1/s", "GB", "MB", "MiB", "x real time"}
 # Without a goal: an error, of which less is better.
@@ -37,7 +38,7 @@ class Entry:
         better = _better(row["goal"], row["unit"])
         if row["unit"] in _ABSOLUTE or better is None:
             return None
-        speed = row["unit"] == _RATIO
+        speed = row["unit"].split(" ")[0] == _RATIO
         return cls(float(row["value"]), better, _SPEED_NOISE if speed else _ACCURACY_NOISE, speed, where)
 
     def worse_by(self, value: float) -> float:
