@@ -15,8 +15,8 @@ from mcap_landmarks.recording.reader import open_recording
 from rosbags.interfaces import Nodetype
 
 from tests.cli.calls import call, refused, schema_of
-from tests.diff.recordings import localized_log
-from tests.runs.chain import raw_log
+from tests.diff.recordings import localized_log, localized_messages, write
+from tests.runs.chain import raw_log, raw_messages
 
 DRAWN = {
     "visualization_msgs/msg/MarkerArray", "nav_msgs/msg/Path", "geometry_msgs/msg/PoseStamped",
@@ -111,14 +111,21 @@ def test_what_is_not_there_is_not_named(tmp_path: Path) -> None:
 
 
 def test_what_has_no_place_in_the_map_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A log before any run: the scan's frame and that of odometry are not connected."""
-    log, out = raw_log(tmp_path / "log.mcap"), tmp_path / "layout.json"
-    assert call("foxglove", log, "-o", out, "--json") == DONE
+    scans = ((one.channel, one.log_time_ns, one.message) for one in raw_messages(2) if one.channel == SCAN)
+    log = write(tmp_path / "log.mcap", [*scans, *localized_messages()])
+    assert call("foxglove", log, "-o", tmp_path / "layout.json", "--json") == DONE
     told = capsys.readouterr()
     document = json.loads(told.out)
     jsonschema.validate(document, schema_of("foxglove"))
-    assert document["left_out"] == [{"topic": "/scan", "reason": "no transforms lead from base_scan to odom"}]
+    assert document["left_out"] == [{"topic": "/scan", "reason": "no transforms lead from base_scan to map"}]
     assert "note: " in told.err
+
+
+def test_before_any_run_the_robot_is_what_is_seen(tmp_path: Path) -> None:
+    """The scan is shown where the LiDAR is on the robot, as nothing tells where that is."""
+    panels = made(raw_log(tmp_path / "log.mcap"), tmp_path)["configById"]
+    assert panels["3D!map"]["followTf"] == "base_footprint"
+    assert [*panels["3D!map"]["topics"]] == ["/scan"]
 
 
 def test_trouble_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -39,7 +39,7 @@ from mcap_landmarks.messages.video import CompressedVideo
 from mcap_landmarks.recording.reader import Recording
 from mcap_landmarks.stage import Channel, Connection
 
-_FRAME_OF = (POSE, MAP_POSE, MAP_MARKERS, MAP, TRUTH_POSE, ODOMETRY)
+_FRAME_OF = (POSE, MAP_POSE, MAP_MARKERS, MAP, TRUTH_POSE)
 """The channels whose frame everything is shown in, the first of them that is there."""
 _IMAGES = (CompressedImage, Image, CompressedVideo)
 _MOST_EMPTY = 200
@@ -115,7 +115,10 @@ class ViewedLog:
 
     @cached_property
     def fixed_frame(self) -> str:
-        """The frame that everything is shown in: of the poses and the map, else of odometry, else the first root."""
+        """The frame that everything is shown in: that of poses and the map, else the first that has no parent.
+
+        Where there is neither it is that of a scan.
+        """
         for channel in _FRAME_OF:
             connection = self.on(channel.topic)
             if connection is not None and (frame := self.frame(connection)):
