@@ -43,3 +43,8 @@ def test_topics_are_of_roles() -> None:
     assert choice.remaps == {"/x": "/y"}
     assert request(RunOptions(image=["/left", "/right", "/left"])).span.choice.images == ("/left", "/right")
     assert request(RunOptions(scan_from="/points")).span.choice.topics == {"scan": "/points"}
+
+
+def test_there_is_a_log() -> None:
+    with pytest.raises(UsageError, match="no log is named; name at least one"):
+        RunOptions().requests([])

@@ -47,8 +47,10 @@ class RunOptions:
         """What to do with each log.
 
         Raises:
-            UsageError: an option cannot be read, or a setting is wrong.
+            UsageError: there is no log, an option cannot be read, or a setting is wrong.
         """
+        if not logs:
+            raise UsageError("no log is named; name at least one")
         settings = gather(self.config_file, [*self.settings, *_slice(self.heights)], self.method)
         first = Request(
             logs[0],
