@@ -15,11 +15,11 @@ def command(
         typer.Option("-o", "--output", parser=location, help="Folder for the results; created if its parent exists."),
     ] = Path("mcap-landmarks-demo"),
 ) -> None:
-    """Build a map of one bundled log, localize another in it, measure the error and draw it.
+    """Build a map of one bundled log, localize another in it, measure the error, draw it and write a page about it.
 
     Every step is a verb that works the same on your own logs; the command line of each is printed before it runs.
     """
-    from mcap_landmarks.cli import evaluate, localize, plot
+    from mcap_landmarks.cli import evaluate, localize, plot, report
     from mcap_landmarks.cli import map as build
     from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
     from mcap_landmarks.resources import resource
@@ -28,7 +28,8 @@ def command(
     folder = make_folder(output)
     seen, asked = resource("recordings", "demo_map.mcap"), resource("recordings", "demo_localize.mcap")
     database, mapped, localized = folder / "map.db", folder / "mapped.mcap", folder / "localized.mcap"
-    picture, given = folder / "localized.png", (ImageOptions(), ScanOptions(), LogOptions())
+    picture, page = folder / "localized.png", folder / "report.html"
+    given = ImageOptions(), ScanOptions(), LogOptions()
 
     say(f"$ mcap-landmarks map {seen} --map {database} -o {mapped}")
     build.command([seen], database, *given, output=mapped)
@@ -41,3 +42,6 @@ def command(
     say()
     say(f"$ mcap-landmarks plot {localized} --align -o {picture}")
     plot.command([localized], picture, align=True)
+    say()
+    say(f"$ mcap-landmarks report {localized} --align -o {page}")
+    report.command([localized], page, align=True)
