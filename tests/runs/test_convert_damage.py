@@ -87,3 +87,14 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path) -> None:
     assert done.stderr.count("\n") == 1
     assert "free space" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["a.bag"]
+
+
+def test_a_log_whose_first_bytes_are_damaged_is_converted_by_its_last_ones(tmp_path: Path) -> None:
+    whole = one(write_ros1(tmp_path / "a.bag"), tmp_path / "a.mcap")
+    data = bytearray((tmp_path / "a.mcap").read_bytes())
+    data[:8] = bytes(8)
+    (tmp_path / "b.mcap").write_bytes(data)
+    assert one(tmp_path / "b.mcap", tmp_path / "out.mcap").topics == whole.topics
+    (tmp_path / "c.mcap").write_bytes(bytes(8) + data[8:-8])
+    with pytest.raises(RecordingError, match="is not an MCAP file, whatever its name says"):
+        run(tmp_path / "c.mcap", tmp_path / "none.mcap")

@@ -84,13 +84,15 @@ def open_bag(path: Path, config: Rosbag2Config) -> Iterator[Sequence[SourceLog]]
 def _part(plain: Path, file: Path, definitions: Definitions) -> Log | McapFile:
     with plain.open("rb") as stream:
         start = stream.read(16)
+        stream.seek(-min(8, stream.seek(0, 2)), 2)
+        end = stream.read()
     if not start and file.stat().st_size:
         raise RecordingError(f"{file} is cut, and nothing of it can be decompressed; copy it again")
     if not start:
         raise RecordingError(f"{file} is empty (0 bytes); record or copy it again")
     if start.startswith(_MAGICS[0]):
         return Db3Log(plain, definitions, file)
-    if start.startswith(_MAGICS[1]):
+    if start.startswith(_MAGICS[1]) or end == _MAGICS[1]:  # its first bytes may be what is damaged
         return McapFile(plain, partial(carry, definitions))
     kind = "an SQLite" if ".db3" in file.name else "an MCAP"
     raise RecordingError(f"{file} is not {kind} file, whatever its name says; check or copy it again")
