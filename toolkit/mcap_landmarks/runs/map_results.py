@@ -82,12 +82,22 @@ def earlier_run(plan: MapPlan, parts: Path) -> MapRun | None:
                 if session.find(plan.share(log)) is None:
                     return None
     reason = "the map was made from the same logs, files and settings"
-    logs, options = [], json.loads(entries["options"])
-    for log, (*before, own) in zip(plan.logs, options[_LOGS], strict=True):
-        outcomes = zip(log.steps, before, strict=True)
-        stages = tuple(StageRun(step.stage.name, "reused", reason, Outcome.of(outcome)) for step, outcome in outcomes)
-        logs.append(MappedLog(log.request.recording, log.fingerprint, stages, Outcome.of(own)))
-    termination = Termination(**options[_SOLVER]) if options[_SOLVER] else None
+    logs = []
+    try:
+        options = json.loads(entries["options"])
+        for log, (*before, own) in zip(plan.logs, options[_LOGS], strict=True):
+            outcomes = zip(log.steps, before, strict=True)
+            stages = tuple(StageRun(step.stage.name, "reused", reason, Outcome.of(told)) for step, told in outcomes)
+            logs.append(MappedLog(log.request.recording, log.fingerprint, stages, Outcome.of(own)))
+        termination = Termination(**options[_SOLVER]) if options[_SOLVER] else None
+    except (
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+    ):  # damaged: nothing of it can be told again
+        return None
     build = StageRun(plan.record.stage, "reused", reason, build_outcome(plan, termination))
     return MapRun(read_map(plan.task.database), build, tuple(logs), termination)
 
