@@ -22,7 +22,7 @@ from mcap_landmarks.runs.thinning import Thinning
 from mcap_landmarks.stage import Channel, RawMessage
 from mcap_landmarks.stages.detect import STAGE
 
-from tests.vision.test_video import COUNT, KEY, is_of, packets, pictures
+from tests.vision.test_video_decoder import COUNT, KEY, is_of, packets, pictures
 
 STEP_NS = 10**8
 EVERYTHING, UNTHINNED = Span(), Thinning()
