@@ -9,7 +9,7 @@ from mcap_landmarks.report.page.html_page import html_page
 from mcap_landmarks.report.page.paged_result import PagedResult
 from mcap_landmarks.report.page.result_document import KeptCounts
 from mcap_landmarks.report.page.result_page import MadePage, Row, figure_rows
-from mcap_landmarks.report.page.result_words import about, metres, share, verdict
+from mcap_landmarks.report.page.result_words import about, metres, off_by_frame, share, verdict
 from mcap_landmarks.report.page.thumbnail import thumbnail
 from mcap_landmarks.wording import counted
 
@@ -41,7 +41,10 @@ def fleet_page(results: Sequence[PagedResult], unread: Sequence[UnreadResult], m
         "title": f"{len(results) + len(unread)} results",
         "verdict": _verdict(ordered),
         "tiles": _tiles(ordered),
-        "missing": [f"{one.name} could not be read: {one.reason}." for one in unread],
+        "missing": [
+            *(f"{one.name} could not be read: {one.reason}." for one in unread),
+            *filter(None, map(off_by_frame, ordered)),
+        ],
         "head": HEAD,
         "rows": [_row(i, one) for i, one in enumerate(ordered)],
         "logs": [_section(one) for one in ordered],

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from mcap_landmarks.channels import DETECTIONS, MATCH, SCAN_OBJECTS, SCENE_OBJECTS
+from mcap_landmarks.evaluation.metrics import frame_note
 from mcap_landmarks.messages.match import Status
 from mcap_landmarks.moments import moment
 from mcap_landmarks.report.page.bundle_table import WORDS
@@ -13,8 +14,6 @@ TIMINGS = (
     "How long the stages took is not known: a result holds no times of the clock, so that the same input gives the "
     "same bytes. A run shows its progress while it lasts."
 )
-_FIT = 0.1
-"""Errors that one rigid move makes so much smaller are mostly of the map's frame."""
 
 
 def verdict(result: PagedResult) -> str:
@@ -89,24 +88,22 @@ def missing(result: PagedResult, losses: Sequence[str] = ()) -> list[str]:
         said.append("This file has no bundles to look at one by one: report the log with results to see them.")
         return said
     if not result.has_images:
-        said.append(f"{name} holds no images, so bundles show none: run the verb again without --results-only.")
+        said.append(f"{name} holds no images, so bundles show none: the recording has none, or --results-only left them out.")
     if result.detector is None:
         said.append(f"{name} holds no detections; mcap-landmarks detect writes them.")
     if result.bundles.stage is not MATCH and not result.run.continuous:
         said.append(f"No bundle was matched: mcap-landmarks localize {name} --map MAP.db -o OUT.mcap does that.")
     if result.drawing.landmarks is None:
         said.append("There is no map in the log, so no landmarks are drawn: localize and map write theirs.")
-    return [*said, *_frame(result)]
+    note = off_by_frame(result)
+    return [*said, note] if note else said
 
 
-def _frame(result: PagedResult) -> list[str]:
-    """Where the map's frame is not the truth's: what is large is one rigid move."""
-    drawn, figures = result.drawn, result.evaluation
-    if drawn is None or figures["alignment"] is not None or (figures["position"]["rmse_m"] or 0.0) < 1.0:
-        return []
-    return [
-        "If the map was not made in the truth's frame, errors are mostly of that: --align moves one onto the other."
-    ]
+def off_by_frame(result: PagedResult) -> str | None:
+    """What to say where most poses lie in another frame than the truth."""
+    figures = result.evaluation
+    note = frame_note(figures["position"], aligned=figures["alignment"] is not None)
+    return f"{result.name}: {note}." if note else None
 
 
 def share(part: int, whole: int) -> str:
