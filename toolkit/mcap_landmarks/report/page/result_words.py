@@ -88,7 +88,9 @@ def missing(result: PagedResult, losses: Sequence[str] = ()) -> list[str]:
         said.append("This file has no bundles to look at one by one: report the log with results to see them.")
         return said
     if not result.has_images:
-        said.append(f"{name} holds no images, so bundles show none: the recording has none, or --results-only left them out.")
+        said.append(
+            f"{name} holds no images, so bundles show none: the recording has none, or --results-only left them out."
+        )
     if result.detector is None:
         said.append(f"{name} holds no detections; mcap-landmarks detect writes them.")
     if result.bundles.stage is not MATCH and not result.run.continuous:
