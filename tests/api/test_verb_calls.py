@@ -108,3 +108,18 @@ def test_a_diff_has_the_document_of_the_verb(tmp_path: Path) -> None:
         ml.diff(log, log, tolerance={"/landmarks/pose.position_m": 0.01, "/landmarks/pose.stamp_ns": "0+1%"}).losses
         == []
     )
+
+
+def test_folders_and_drives_are_compared_as_diff_compares_them(tmp_path: Path) -> None:
+    for folder in ("before", "after"):
+        (tmp_path / folder).mkdir()
+        localized_log(tmp_path / folder / "a.mcap")
+    document = ml.diff_folders(tmp_path / "before", tmp_path / "after")
+    assert [log["log"] for log in document["logs"]] == ["a"]
+    assert not document["fails"]
+    drives = ml.diff_drives(tmp_path / "before" / "a.mcap", tmp_path / "after" / "a.mcap")
+    assert drives.document["verdict"] == "two drives"
+    assert drives.fails
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ml.UsageError):
+        ml.diff_folders(tmp_path / "before", tmp_path / "empty")

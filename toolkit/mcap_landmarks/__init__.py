@@ -12,7 +12,16 @@ if TYPE_CHECKING:
     from mcap_landmarks.api.log_reader import LogReader, open_log
     from mcap_landmarks.api.logged_items import LoggedCloud, LoggedImage, LoggedScan
     from mcap_landmarks.api.pose_errors import EvaluationResult
-    from mcap_landmarks.api.verb_calls import Options, build_map, diff, evaluate, localize, run
+    from mcap_landmarks.api.verb_calls import (
+        Options,
+        build_map,
+        diff,
+        diff_drives,
+        diff_folders,
+        evaluate,
+        localize,
+        run,
+    )
     from mcap_landmarks.diff.comparison import Diff
     from mcap_landmarks.errors import (
         ExtensionError,
@@ -52,6 +61,8 @@ __all__ = [
     "UsageError",
     "build_map",
     "diff",
+    "diff_drives",
+    "diff_folders",
     "evaluate",
     "example_log",
     "localize",
@@ -73,6 +84,8 @@ _MODULES = {
     "StructuredArray": "structured",
     "build_map": "api.verb_calls",
     "diff": "api.verb_calls",
+    "diff_drives": "api.verb_calls",
+    "diff_folders": "api.verb_calls",
     "evaluate": "api.verb_calls",
     "example_log": "resources",
     "localize": "api.verb_calls",

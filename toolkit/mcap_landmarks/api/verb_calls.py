@@ -10,6 +10,11 @@ from mcap_landmarks.atomic import check_target
 from mcap_landmarks.diff.comparison import Diff
 from mcap_landmarks.diff.comparison import diff as compare
 from mcap_landmarks.diff.conditions import parse
+from mcap_landmarks.diff.criteria import read_criteria
+from mcap_landmarks.diff.drives import DriveDiff
+from mcap_landmarks.diff.drives import diff_drives as compare_drives
+from mcap_landmarks.diff.set_document import SetDocument
+from mcap_landmarks.diff.sets import diff_sets
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.evaluation.evaluate import Association, evaluate_file, pairing_by
 from mcap_landmarks.recording.reader import reading_from_front
@@ -148,6 +153,44 @@ def diff(
     with reading_from_front() if lenient else nullcontext():
         sides, truth = (place(baseline), place(candidate)), maybe_place(reference)
         found = compare(*sides, pairs(tolerance), conditions, reference=truth, aligned=align)
+    tell(place(candidate), found.losses)
+    return found
+
+
+def diff_folders(
+    baseline: AnyPath,
+    candidate: AnyPath,
+    *,
+    criteria: AnyPath | None = None,
+    fail_on: str | Sequence[str] | None = None,
+    reference: AnyPath | None = None,
+) -> SetDocument:
+    """What changed between two folders of results, a verdict for each metric over all logs: that of `diff --json`.
+
+    Logs are paired by recording, else by name; either folder may hold what was blessed. `criteria` is a TOML file.
+
+    Raises:
+        ToolkitError: no log is in both, or a file cannot be read.
+    """
+    rules = None if criteria is None else read_criteria(place(criteria))
+    conditions = [parse(text) for text in texts(fail_on)]
+    return diff_sets(place(baseline), place(candidate), rules, conditions, reference=maybe_place(reference))
+
+
+def diff_drives(
+    baseline: AnyPath,
+    candidate: AnyPath,
+    *,
+    fail_on: str | Sequence[str] | None = None,
+    reference: AnyPath | None = None,
+) -> DriveDiff:
+    """How the results of two drives differ, by rates, gaps, distributions, classes, landmarks and errors.
+
+    Raises:
+        ToolkitError: a file cannot be read, or a condition is wrong.
+    """
+    conditions = [parse(text) for text in texts(fail_on)]
+    found = compare_drives(place(baseline), place(candidate), conditions, reference=maybe_place(reference))
     tell(place(candidate), found.losses)
     return found
 
