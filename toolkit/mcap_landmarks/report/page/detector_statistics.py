@@ -20,8 +20,9 @@ from mcap_landmarks.stage import Channel
 _AT_ONCE = 2000
 """So many messages become columns together; memory stays small."""
 _BINS = np.linspace(0.0, 1.0, 21)
-Boxes = tuple[tuple[str, ...], Array, Array]
-"""Of one image: class names of K boxes, their scores (K,) and corners (K, 4)."""
+Corners = tuple[float, float, float, float]
+Boxes = tuple[list[str], list[float], list[Corners]]
+"""Of one image: class names of K boxes, their scores and corners (least x and y, greatest x and y)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +64,7 @@ def detector_statistics(recording: Recording) -> DetectorStatistics | None:
     for stamp_ns, found in _images(recording, DETECTIONS):
         images += 1
         empty += not found[0]
-        for name, score in zip(found[0], found[1].tolist(), strict=True):
+        for name, score in zip(found[0], found[1], strict=True):
             scores[name].append(score)
         if stamp_ns in truth:
             compared += 1
@@ -90,15 +91,33 @@ def _compared(found: Boxes, truth: Boxes) -> tuple[list[str], list[str]]:
     """The classes of boxes that are true, and of true ones that no box is of."""
     names, _, boxes = found
     others, _, corners = truth
-    same = np.array(names, dtype=np.str_)[:, None] == np.array(others, dtype=np.str_)
-    sides = np.minimum(boxes[:, None, 2:], corners[:, 2:]) - np.maximum(boxes[:, None, :2], corners[:, :2])
-    shared = np.maximum(sides, 0.0).prod(axis=2)
-    areas = (boxes[:, 2:] - boxes[:, :2]).prod(axis=1)[:, None] + (corners[:, 2:] - corners[:, :2]).prod(axis=1)
-    overlap = np.where(same, shared / np.maximum(areas - shared, 1e-9), 0.0)
-    overlap[overlap < SAME_IOU] = 0.0
-    mine, theirs = linear_sum_assignment(-overlap)
-    paired = {int(j) for i, j in zip(mine, theirs, strict=True) if overlap[i, j] > 0.0}
+    pairs = {
+        (i, j): overlap
+        for i, box in enumerate(boxes)
+        for j, other in enumerate(corners)
+        if names[i] == others[j] and (overlap := _overlap(box, other)) >= SAME_IOU
+    }
+    paired = {j for _, j in pairs}
+    if len(pairs) > len(paired) or len(pairs) > len({i for i, _ in pairs}):  # there is something to choose
+        overlaps = np.zeros((len(boxes), len(corners)))
+        for pair, overlap in pairs.items():
+            overlaps[pair] = overlap
+        mine, theirs = linear_sum_assignment(-overlaps)
+        paired = {j for i, j in zip(mine.tolist(), theirs.tolist(), strict=True) if (i, j) in pairs}
     return [others[j] for j in sorted(paired)], [name for j, name in enumerate(others) if j not in paired]
+
+
+def _overlap(box: Corners, other: Corners) -> float:
+    """Intersection over union; in plain numbers, as images have few boxes and there are many images."""
+    left, top, right, bottom = box
+    other_left, other_top, other_right, other_bottom = other
+    width = min(right, other_right) - max(left, other_left)
+    height = min(bottom, other_bottom) - max(top, other_top)
+    if width <= 0.0 or height <= 0.0:
+        return 0.0
+    shared = width * height
+    areas = (right - left) * (bottom - top) + (other_right - other_left) * (other_bottom - other_top)
+    return shared / max(areas - shared, 1e-9)
 
 
 def _images(recording: Recording, channel: Channel[Message]) -> Iterator[tuple[int, Boxes]]:
@@ -141,9 +160,10 @@ def _boxes(ros_type: str, schema: str, messages: list[bytes]) -> Iterator[tuple[
     scores[classed] = options.columns["hypothesis.score"].values[first[classed], 0]
     middle = boxes.columns["bbox.center.position"].values
     half_sides = np.hstack([boxes.columns[f"bbox.size_{axis}"].values for axis in "xy"]) / 2
-    corners = np.hstack([middle - half_sides, middle + half_sides])
+    corners = [tuple(row) for row in np.hstack([middle - half_sides, middle + half_sides]).tolist()]
     ends = np.cumsum(counts)
     stamps = table.columns["header.stamp"].values[:, 0]
+    every = list(zip(names.tolist(), scores.tolist(), corners, strict=True))
     for stamp_ns, start, end in zip(stamps.tolist(), (ends - counts).tolist(), ends.tolist(), strict=True):
-        rows = np.flatnonzero(classed[start:end]) + start
-        yield stamp_ns, (tuple(names[rows].tolist()), scores[rows], corners[rows])
+        kept = [box for box, has_class in zip(every[start:end], classed[start:end], strict=True) if has_class]
+        yield stamp_ns, ([box[0] for box in kept], [box[1] for box in kept], [box[2] for box in kept])
