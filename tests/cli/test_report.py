@@ -65,3 +65,14 @@ def test_trouble_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert call("report", log, "-o", page, "--lenient") == 3
     assert "warning: " in capsys.readouterr().err
     assert "Not all of the file could be read" in page.read_text()
+
+
+def test_what_a_run_printed_tells_how_long_its_stages_took(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, page, printed = localized_log(tmp_path / "r.mcap"), tmp_path / "r.html", tmp_path / "run.json"
+    printed.write_text(json.dumps({"logs": [{"output": f"out/{name}", "seconds": {"fuse": 1.25}} for name in "ab"]}))
+    assert "is of a, b, and not of r.mcap" in refused(capsys, 2, "report", log, "-o", page, "--run", printed)
+    printed.write_text(json.dumps({"output": "out/r.mcap", "seconds": {"fuse": 1.25, "localize": 2.0}}))
+    assert call("report", log, "-o", page, "--run", printed) == 0
+    assert "The stages that ran took 3.2 s." in page.read_text()
+    assert "is of one result" in refused(capsys, 2, "report", log, log, "-o", page, "--run", printed)
+    assert "cannot be read as JSON" in refused(capsys, 2, "report", log, "-o", page, "--run", log)

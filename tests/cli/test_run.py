@@ -91,8 +91,8 @@ def test_a_map_from_pixels(here: Path, capsys: pytest.CaptureFixture[str], monke
     database = (here / "new.db").read_bytes()
     again = document(capsys, here, *words)
     assert again["stages"] == dict.fromkeys(("cluster", "detect", "fuse", "build_map"), "reused")
-    assert [log | {"stages": 0, "reasons": 0} for log in again["logs"]] == [
-        log | {"stages": 0, "reasons": 0} for log in found["logs"]
+    assert [log | {"stages": 0, "reasons": 0, "seconds": 0} for log in again["logs"]] == [
+        log | {"stages": 0, "reasons": 0, "seconds": 0} for log in found["logs"]
     ]
     assert len(looks) == COUNT
     assert (here / "new.db").read_bytes() == database

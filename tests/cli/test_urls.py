@@ -43,7 +43,7 @@ LINES = {
     "models get": "models get nanodet --from {archive}",
     "plot": "plot {inputs} -o {output}",
     "recover": "recover {log} -o {output} --definitions {definitions}",
-    "report": "report {results} -o {output} --reference {reference}",
+    "report": "report {results} -o {output} --reference {reference} --run {printed}",
     "video": "video {result} -o {output}",
     "run": "run {logs} -o {output} --stages detect,cluster,fuse,localize --map {map_file} --model {model} "
     "--names {names} --extrinsics {extrinsics} --config {config_file}",
@@ -79,6 +79,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
     (folder / "names.txt").write_text("person\nfire hydrant\n")
     (folder / "extrinsics.json").write_text('{"transforms": []}')
     (folder / "config.toml").touch()
+    (folder / "run.json").write_text('{"seconds": {}}')
     (folder / "State.msg").write_text("int32 value\n")
     return {
         **dict.fromkeys(("log", "logs", "inputs", "paths", "baseline", "reference", "result", "results"), log),
@@ -86,6 +87,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
         "candidate": scenes,
         "model": two_posts(folder / "model.onnx"),
         "names": folder / "names.txt",
+        "printed": folder / "run.json",
         "images": resource("recordings", "demo.png"),
         "config_file": folder / "config.toml",
         "extrinsics": folder / "extrinsics.json",

@@ -37,6 +37,10 @@ def command(
         Location | None,
         typer.Option("--reference", parser=location, help="Where the truth is: a log, or a trajectory (.tum, .txt)."),
     ] = None,
+    printed: Annotated[
+        Location | None,
+        typer.Option("--run", parser=location, help="What the run printed with --json, for the seconds of its stages."),
+    ] = None,
     overwrite: options.Overwrite = False,
     json: options.Json = False,
 ) -> None:
@@ -47,13 +51,15 @@ def command(
     from mcap_landmarks.report.page.written_report import check_report, written_report
     from mcap_landmarks.runs.replacing import earlier_picture, output_to
 
-    check_report(results, output, is_diff=diff)
-    read = [*results, *([reference] if reference is not None else [])]
+    check_report(results, output, is_diff=diff, printed=printed)
+    read = [*results, *(file for file in (reference, printed) if file is not None)]
     with (
         output_to(output, read, earlier_picture("report", results), overwrite=overwrite),
         progress("read", sum(map(size_of, results)) or None) as advance,
     ):
-        made = written_report(results, output, reference, is_diff=diff, aligned=align, progress=advance)
+        made = written_report(
+            results, output, reference, printed=printed, is_diff=diff, aligned=align, progress=advance
+        )
     _tell(made, output, as_json=json)
     if made.losses:
         raise typer.Exit(PARTIAL)

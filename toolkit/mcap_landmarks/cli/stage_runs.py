@@ -115,6 +115,7 @@ def told(stages: "Sequence[StageRun]") -> dict[str, object]:
     return {
         "stages": {run.stage: run.state for run in stages},
         "reasons": {run.stage: run.reason for run in stages},
+        "seconds": {run.stage: round(run.seconds, 3) for run in stages if run.seconds is not None},
         "dropped": dropped(stages),
     }
 

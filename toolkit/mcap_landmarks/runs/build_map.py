@@ -1,5 +1,6 @@
 """Build one landmark map from many logs, and write each log with its results where asked."""
 
+import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -88,7 +89,7 @@ def _check_replaceable(plan: MapPlan) -> None:
 
 def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
     """Run what is missing, gather what every log saw, solve, and write the database."""
-    reason = why_anew(plan)
+    reason, began = why_anew(plan), time.perf_counter()
     seen = [_observe(plan, log, reason, parts, watch) for log in plan.logs]
     logs = [mapped for mapped, _, _ in seen]
     with watch("solve", None, "steps"):
@@ -98,7 +99,9 @@ def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
     for log, trajectory, (_, _, shifts_ns) in zip(plan.logs, trajectories, seen, strict=True):
         if log.request.recording in plan.task.outputs:
             write_part(plan, log, landmark_map, trajectory_as_stamped(trajectory, shifts_ns), parts)
-    build = StageRun(STAGE.name, "ran", reason, build_outcome(plan, termination))
+    others = sum(stage.seconds or 0.0 for log in logs for stage in log.stages)
+    seconds = time.perf_counter() - began - others
+    build = StageRun(STAGE.name, "ran", reason, build_outcome(plan, termination), seconds)
     run = MapRun(landmark_map, build, tuple(logs), termination)
     fingerprints = tuple(log.fingerprint for log in logs)
     manifest = Manifest(VERB, inputs=fingerprints, options=run.options(), stages=(plan.record,))

@@ -2,6 +2,7 @@
 
 import contextlib
 import shutil
+import time
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -27,12 +28,13 @@ from mcap_landmarks.runs.stage_runner import run_stage
 
 @dataclass(frozen=True, slots=True)
 class StageRun:
-    """What became of one stage: `state` is `ran` or `reused`, and `reason` says why, in words."""
+    """What became of one stage: `state` is `ran` or `reused`, `reason` says why, in words; `seconds` it ran."""
 
     stage: str
     state: str
     reason: str
     outcome: Outcome
+    seconds: float | None = None
 
 
 @contextlib.contextmanager
@@ -140,11 +142,12 @@ class Session:
         name, reason = step.stage.name, self._why(step.record)
         self._check_files(step, reason)
         target = part_file(self._parts, step.record)
+        began = time.perf_counter()
         log = StageInput(step.stage, self.log_for(step.record), self.request.span, self.examiner)
         with watch(f"{name} {self.log.path.name}", log.count, "bundles") as progress:
             record = run_stage(step, log, self.request.thinning, target, progress)
         self._show(result_layers(self._open(target)))
-        return StageRun(name, "ran", reason, record.outcome)
+        return StageRun(name, "ran", reason, record.outcome, time.perf_counter() - began)
 
     def _check_files(self, step: Step, reason: str) -> None:
         lacking = [name for name in step.stage.resources if name not in step.files]

@@ -1,8 +1,9 @@
 """What a detector said over a whole log: how often which class, how surely, and how much of it is true."""
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -12,6 +13,7 @@ from mcap_landmarks.errors import MessageError
 from mcap_landmarks.evaluation.audition import SAME_IOU
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.messages.codec import Message
+from mcap_landmarks.messages.columns import Table
 from mcap_landmarks.messages.layout import layout_of
 from mcap_landmarks.messages.typestore import definition_in
 from mcap_landmarks.recording.reader import Recording
@@ -93,18 +95,22 @@ def _compared(found: Boxes, truth: Boxes) -> tuple[list[str], list[str]]:
     others, _, corners = truth
     pairs = {
         (i, j): overlap
-        for i, box in enumerate(boxes)
-        for j, other in enumerate(corners)
+        for (i, box), (j, other) in product(enumerate(boxes), enumerate(corners))
         if names[i] == others[j] and (overlap := _overlap(box, other)) >= SAME_IOU
     }
     paired = {j for _, j in pairs}
-    if len(pairs) > len(paired) or len(pairs) > len({i for i, _ in pairs}):  # there is something to choose
-        overlaps = np.zeros((len(boxes), len(corners)))
-        for pair, overlap in pairs.items():
-            overlaps[pair] = overlap
-        mine, theirs = linear_sum_assignment(-overlaps)
-        paired = {j for i, j in zip(mine.tolist(), theirs.tolist(), strict=True) if (i, j) in pairs}
+    if len(pairs) > min(len(paired), len({i for i, _ in pairs})):  # there is something to choose
+        paired = _best(pairs, (len(boxes), len(corners)))
     return [others[j] for j in sorted(paired)], [name for j, name in enumerate(others) if j not in paired]
+
+
+def _best(pairs: Mapping[tuple[int, int], float], shape: tuple[int, int]) -> set[int]:
+    """The true ones that have a box, where the pairs are one to one and their overlap is the largest in all."""
+    overlaps = np.zeros(shape)
+    for pair, overlap in pairs.items():
+        overlaps[pair] = overlap
+    mine, theirs = linear_sum_assignment(-overlaps)
+    return {j for i, j in zip(mine.tolist(), theirs.tolist(), strict=True) if (i, j) in pairs}
 
 
 def _overlap(box: Corners, other: Corners) -> float:
@@ -148,6 +154,10 @@ def _boxes(ros_type: str, schema: str, messages: list[bytes]) -> Iterator[tuple[
             yield from _boxes(ros_type, schema, messages[:half])
             yield from _boxes(ros_type, schema, messages[half:])
         return
+    yield from _boxes_of(table)
+
+
+def _boxes_of(table: Table) -> Iterator[tuple[int, Boxes]]:
     counts, boxes = table.children["detections"]
     results, options = boxes.children["results"]
     first = np.cumsum(results) - results

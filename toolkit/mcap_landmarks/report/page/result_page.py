@@ -15,6 +15,7 @@ from mcap_landmarks.report.page.html_page import html_page
 from mcap_landmarks.report.page.paged_result import PagedResult
 from mcap_landmarks.report.page.result_document import KeptCounts, result_document
 from mcap_landmarks.report.page.result_words import TIMINGS, about, metres, missing, share, verdict
+from mcap_landmarks.report.page.stage_seconds import StageSeconds
 
 _POSITIONS = 200
 """So many positions of the thesis's table are on the page; `evaluate --thesis` writes all."""
@@ -31,7 +32,7 @@ class MadePage(NamedTuple):
     thinned: list[str]
 
 
-def result_page(result: PagedResult, mark: str) -> MadePage:
+def result_page(result: PagedResult, mark: str, seconds: StageSeconds) -> MadePage:
     """The page of a result; see `html_page` for the mark."""
     document, counts, thinned = result_document(result)
     values = {
@@ -46,7 +47,7 @@ def result_page(result: PagedResult, mark: str) -> MadePage:
         **_thesis(result),
         **_detector(result),
         **_map(result),
-        **made(result.manifest),
+        **made(result.manifest, seconds),
         "thinned": thinned,
     }
     data = {"runs": [document], "statuses": status_names(), "first": _first(document)}
@@ -186,19 +187,21 @@ def _map(result: PagedResult) -> dict[str, object]:
     return {"landmarks": rows, "landmarks_words": words, "map_words": told}
 
 
-def made(manifest: Mapping[str, str] | None) -> dict[str, object]:
-    """The manifest entry by entry, a row per stage, and why there are no timings."""
+def made(manifest: Mapping[str, str] | None, seconds: StageSeconds) -> dict[str, object]:
+    """The manifest entry by entry, a row per stage, and how long each took, or why that is not known."""
+    timings = f"The stages that ran took {sum(seconds.values()):.1f} s." if seconds else TIMINGS
     if not manifest:
-        return {"timings": f"{TIMINGS} The file has no manifest.", "stages": [], "manifest": []}
+        return {"timings": f"{timings} The file has no manifest.", "stages": [], "manifest": []}
     rows = []
     for record in stage_records({RUN: manifest}).values():
         told = record.outcome
         kinds = (
             ", ".join(f"{count} {what}" for what, count in counts.items()) for counts in (told.counts, told.dropped)
         )
-        rows.append([record.stage, str(told.bundles), str(told.unreadable), *(text or "–" for text in kinds)])
+        took = f"{seconds[record.stage]:.1f}" if record.stage in seconds else "–"
+        rows.append([record.stage, took, str(told.bundles), str(told.unreadable), *(text or "–" for text in kinds)])
     return {
-        "timings": TIMINGS,
+        "timings": timings,
         "stages": rows,
         "manifest": [(name, _pretty(text)) for name, text in sorted(manifest.items())],
     }

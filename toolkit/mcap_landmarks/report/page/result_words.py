@@ -12,7 +12,7 @@ from mcap_landmarks.wording import counted
 
 TIMINGS = (
     "How long the stages took is not known: a result holds no times of the clock, so that the same input gives the "
-    "same bytes. A run shows its progress while it lasts."
+    "same bytes. What the run printed with --json has them: give it with --run FILE."
 )
 
 

@@ -16,6 +16,7 @@ from mcap_landmarks.report.page.diff_page import diff_page
 from mcap_landmarks.report.page.fleet_page import UnreadResult, fleet_page
 from mcap_landmarks.report.page.paged_result import PagedResult, read_result
 from mcap_landmarks.report.page.result_page import MadePage, result_page
+from mcap_landmarks.report.page.stage_seconds import stage_seconds
 from mcap_landmarks.runs.replacing import picture_mark
 
 _ENDINGS = (".html", ".htm")
@@ -43,17 +44,22 @@ class WrittenReport:
         }
 
 
-def check_report(results: Sequence[Location], output: Location, *, is_diff: bool) -> None:
+def check_report(
+    results: Sequence[Location], output: Location, *, is_diff: bool, printed: Location | None = None
+) -> None:
     """Refuse what cannot become a page.
 
     Raises:
-        UsageError: the output's name is not of a page or it cannot be written, or --diff is not of two results.
+        UsageError: the output's name is not of a page or it cannot be written, or --diff is not of two
+            results, or --run not of one.
     """
     check_target(output)
     if output.suffix.lower() not in _ENDINGS:
         raise UsageError(f"{output}: a report is a page; use a name that ends with .html")
     if is_diff and len(results) != 2:
         raise UsageError(f"--diff is of two results, BASELINE and CANDIDATE, not of {len(results)}; name both")
+    if printed is not None and len(results) != 1:
+        raise UsageError(f"--run is of one result, not of {len(results)}; leave it out")
 
 
 def written_report(
@@ -61,11 +67,14 @@ def written_report(
     output: Location,
     reference: Location | None = None,
     *,
+    printed: Location | None = None,
     is_diff: bool = False,
     aligned: bool = False,
     progress: Progress | None = None,
 ) -> WrittenReport:
     """Read results and write their page: of one, of two that are compared, or of many.
+
+    `printed` is what the run of a single result printed with --json.
 
     Raises:
         ToolkitError: a result or the reference cannot be read, of many all cannot, or the page cannot be written.
@@ -82,11 +91,16 @@ def written_report(
         losses += [f"{one.name} could not be read: {one.reason}" for one in unread]
     else:
         found = [read(path, name) for path, name in zip(results, names, strict=True)]
-        page = _diff(results, found, reference, losses, mark) if is_diff else result_page(found[0], mark)
+        page = _diff(results, found, reference, losses, mark) if is_diff else _single(found[0], mark, printed)
     losses += [f"{one.path}: {loss}" for one in found for loss in one.losses]
     with atomic_file(output) as stream:
         stream.write(page.content)
     return WrittenReport(kind, names, page, tuple(dict.fromkeys(losses)))
+
+
+def _single(found: PagedResult, mark: str, printed: Location | None) -> MadePage:
+    """The page of one result, with what its run printed, if that is given."""
+    return result_page(found, mark, stage_seconds(printed, found.path) if printed is not None else {})
 
 
 def _diff(
