@@ -61,6 +61,8 @@ def test_trouble_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     bare = write(tmp_path / "bare.mcap", [entry for entry in localized_messages() if entry[0] == TRUTH_POSE])
     assert "holds no results to show; run localize" in refused(capsys, 1, "report", bare, "-o", page)
     assert not page.exists()
+    another = MAP_DB.with_name("localize.mcap")
+    assert "are of two drives" in refused(capsys, 2, "report", log, another, "--diff", "-o", page)
     log.write_bytes(log.read_bytes()[:-200])
     assert call("report", log, "-o", page, "--lenient") == 3
     assert "warning: " in capsys.readouterr().err

@@ -52,6 +52,9 @@ def test_what_is_not_said_stays(tmp_path: Path) -> None:
         ("[metrics.nees]\ndirection = 'down'", "metrics.nees.direction = 'down'"),
         ("metrics = 3", "write a table for each"),
         ("metrics.position = 3", "no figure position with criteria"),
+        ("[metrics.position.rmse_m]\nlimit = true", "metrics.position.rmse_m.limit = True"),
+        ('[metrics.position.rmse_m]\ngates = "yes"', "metrics.position.rmse_m.gates = 'yes'"),
+        ('[metrics.position.rmse_m]\nmargin = "0.03"', "metrics.position.rmse_m.margin = '0.03'"),
         ("[", "not a TOML file"),
     ],
 )

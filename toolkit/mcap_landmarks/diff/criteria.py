@@ -154,7 +154,7 @@ def _criterion(path: Location, name: str, keys: Mapping[str, object]) -> Criteri
 
 def _validated(path: Location, adapter: TypeAdapter[_T], values: Mapping[str, object], prefix: str) -> _T:
     try:
-        return adapter.validate_python(dict(values))
+        return adapter.validate_python(dict(values), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])

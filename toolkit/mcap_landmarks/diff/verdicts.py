@@ -125,10 +125,11 @@ def _judge(entry: VerdictEntry, criteria: Criteria, together: int) -> None:
 
 def _why_not(entry: VerdictEntry, level: float, together: int) -> str | None:
     """Why there is no verdict, where it takes more logs for any."""
+    tell = "tells" if entry["logs"] == 1 else "tell"
     logs, change, same = counted(entry["logs"], "log"), least_pairs(level / 2 / together), least_pairs(level)
     if entry["logs"] < same:
-        return f"{logs} tell too little: sameness can be shown with {same} or more, a change with {change}"
-    return f"{logs} tell too little: a change can be shown with {change} or more" if entry["logs"] < change else None
+        return f"{logs} {tell} too little: sameness can be shown with {same} or more, a change with {change}"
+    return f"{logs} {tell} too little: a change can be shown with {change} or more" if entry["logs"] < change else None
 
 
 def _changes(name: str, pairs: Sequence[Sides]) -> list[bool]:

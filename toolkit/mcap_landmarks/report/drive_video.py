@@ -72,7 +72,8 @@ def make_video(path: Location, target: Path, form: VideoForm, progress: Callable
                 count += 1
         lost = dict.fromkeys([*losses, *shown.losses])
     if not count:
-        raise RecordingError(f"{path}: has no images, scans or poses to show; name a log with some")
+        where = "" if form.start_ns is None and form.end_ns is None else " between --start and --end"
+        raise RecordingError(f"{path}: has no images, scans or poses to show{where}; name a log or a time with some")
     return VideoMade(count, tuple(sorted({one.topic for one in read_as})), tuple(lost))
 
 

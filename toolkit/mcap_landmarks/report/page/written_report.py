@@ -7,11 +7,13 @@ from functools import partial
 
 from mcap_landmarks.atomic import atomic_file, check_target
 from mcap_landmarks.diff.comparison import diff
+from mcap_landmarks.diff.two_drives import are_two_drives
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.evaluation.metrics import Reference
 from mcap_landmarks.evaluation.read import read_reference
 from mcap_landmarks.locations import Location
 from mcap_landmarks.progress import Progress
+from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.report.page.diff_page import diff_page
 from mcap_landmarks.report.page.fleet_page import UnreadResult, fleet_page
 from mcap_landmarks.report.page.paged_result import PagedResult, read_result
@@ -111,6 +113,13 @@ def _diff(
     mark: str,
 ) -> MadePage:
     """The page of two results; what their diff cannot read is added to the losses."""
+    if all(one.is_log for one in found):
+        with open_recording(results[0]) as mine, open_recording(results[1]) as theirs:
+            if are_two_drives(mine, theirs):
+                raise UsageError(
+                    f"{results[0]} and {results[1]} are of two drives, which have no bundle in common; "
+                    "leave --diff out for a table of both, or see mcap-landmarks diff --drives"
+                )
     compared = diff(results[0], results[1], reference=reference)
     losses += compared.losses
     return diff_page(found[0], found[1], compared.document, compared.losses, mark)
