@@ -1,6 +1,6 @@
 """What a log looks like from Python: the bundled recordings, results, and logs that are odd."""
 
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 
 import mcap_landmarks as ml
@@ -165,8 +165,9 @@ def test_what_cannot_be_read_is_told_once_and_listed(tmp_path: Path) -> None:
     content = path.read_bytes()
     path.write_bytes(content.replace(b"base_scan", b"base_sc\xff\xfe"))
     with ml.open_log(path) as log:
-        with pytest.warns(ml.LossWarning, match=r"log\.mcap"):
+        with pytest.warns(ml.LossWarning, match=r"log\.mcap") as told:
             assert list(log.scans()) == []
+        assert {one.filename for one in told} == {__file__}  # the caller's line, whoever finds out
         assert log.losses
         list(log.scans())  # and no warning once more
 
@@ -191,5 +192,30 @@ def test_a_log_closes_itself(tmp_path: Path) -> None:
     log = ml.open_log(path, lenient=True)
     assert len(log.ground_truth()) == 1
     log.close()
-    with pytest.raises(ValueError, match="closed file"):
-        log.ground_truth()
+    for read in (log.ground_truth, log.poses, log.odometry, log.scans, log.clouds, log.matches):
+        with pytest.raises(ml.UsageError, match="the log is closed"):
+            read()
+
+
+def test_what_is_read_one_by_one_ends_when_the_log_is_closed() -> None:
+    with ml.open_log(DEMO) as log:
+        begun, new = log.scans(), log.scans()
+        next(begun)
+    for scans in (begun, new):
+        with pytest.raises(ml.UsageError, match="the log is closed"):
+            next(scans)
+
+
+@pytest.mark.parametrize(
+    "given", [np.datetime64("NaT"), True, 1.5, date(2026, 1, 1), timedelta(1), np.timedelta64(1, "s"), [1], "yesterday"]
+)
+def test_what_is_no_moment_is_refused(given: Moment) -> None:
+    with pytest.raises(ml.UsageError, match=r"start .*: give RFC 3339"):
+        ml.open_log(DEMO, start=given)
+
+
+def test_arguments_of_a_wrong_type_are_named() -> None:
+    with pytest.raises(ml.UsageError, match="remap 'x' is no mapping"):
+        ml.open_log(DEMO, remap="x")  # type: ignore[arg-type] # that is what is refused
+    with pytest.raises(ml.UsageError, match="path is of type int"):
+        ml.open_log(3)  # type: ignore[arg-type] # that is what is refused

@@ -56,7 +56,18 @@ def test_what_is_wrong_is_said_as_by_the_command_line(tmp_path: Path) -> None:
         ml.run(DEMO, [], output)
     with pytest.raises(ml.ToolkitError, match=r"none\.db: cannot be read"):
         ml.localize(DEMO, tmp_path / "none.db", output, **UNTIL)
+    landmark_map = ml.LandmarkMap.read(GOLDEN / "map.db")
+    with pytest.raises(ml.UsageError, match="map_file is of type LandmarkMap; give the path"):
+        ml.localize(DEMO, landmark_map, output)  # type: ignore[arg-type] # that is what is refused
+    with pytest.raises(ml.UsageError, match="logs is of type int"):
+        ml.build_map([3], output)  # type: ignore[list-item] # that is what is refused
     assert not output.exists()
+
+
+def test_a_map_is_written_to_names_that_tell_the_format(tmp_path: Path) -> None:
+    with pytest.raises(ml.UsageError, match=r"one of \.db, \.txt, \.csv, \.json"):
+        ml.LandmarkMap.read(GOLDEN / "map.db").write(tmp_path / "map.foo")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_map_is_built_of_what_logs_hold_and_localized_in(tmp_path: Path) -> None:
@@ -117,6 +128,8 @@ def test_folders_and_drives_are_compared_as_diff_compares_them(tmp_path: Path) -
     document = ml.diff_folders(tmp_path / "before", tmp_path / "after")
     assert [log["log"] for log in document["logs"]] == ["a"]
     assert not document["fails"]
+    with pytest.raises(ml.UsageError, match="before is a folder; compare folders with diff_folders"):
+        ml.diff(tmp_path / "before", tmp_path / "after")
     drives = ml.diff_drives(tmp_path / "before" / "a.mcap", tmp_path / "after" / "a.mcap")
     assert drives.document["verdict"] == "two drives"
     assert drives.fails

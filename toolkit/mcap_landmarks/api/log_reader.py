@@ -30,7 +30,7 @@ from mcap_landmarks.recording.odometry_track import odometry_from
 from mcap_landmarks.recording.reader import open_recording, reading_from_front
 from mcap_landmarks.runs.bundles import Reading, Span, decoded, inputs_of
 from mcap_landmarks.runs.recorded_log import RecordedLog
-from mcap_landmarks.stage import Channel, Connection
+from mcap_landmarks.stage import Channel, Connection, RawMessage
 from mcap_landmarks.structured import StructuredArray
 from mcap_landmarks.wording import counted
 
@@ -51,11 +51,11 @@ def open_log(
 
     Raises:
         RecordingError: there is no such file, or it is not an MCAP file.
-        UsageError: no message lies between start and end.
+        UsageError: no message lies between start and end, or an argument is not of its type.
     """
-    choice = Choice(remaps=parse_remaps(pairs(remap)))
+    choice = Choice(remaps=parse_remaps(pairs(remap, "remap")))
     return LogReader(
-        place(path), Span(choice, moment_ns(start, "start"), moment_ns(end, "end")), reads_from_front=lenient
+        place(path, "path"), Span(choice, moment_ns(start, "start"), moment_ns(end, "end")), reads_from_front=lenient
     )
 
 
@@ -65,7 +65,7 @@ class LogReader:
     `start_ns` and `end_ns` are the first and last log time. Images, scans and clouds come one by one, so that logs may
     be of any length; everything else comes as a whole table. Topics are found by their type, as the verbs find them;
     where several fit, the error lists them, and `topic` chooses. What cannot be read is left out, told by a
-    `LossWarning`, and listed in `losses`.
+    `LossWarning`, and listed in `losses`. Once it is closed, reading raises a `UsageError`.
     """
 
     def __init__(self, path: Location, span: Span, *, reads_from_front: bool) -> None:
@@ -134,6 +134,7 @@ class LogReader:
 
     def clouds(self, topic: str | None = None) -> Iterator[LoggedCloud]:
         """The point clouds of a LiDAR or depth camera, one by one; raises as `images`."""
+        self._check_open()
         topics = [topic] if topic else self._info.roles["point_cloud"]
         if len(topics) != 1:
             there = f"{' and '.join(topics)} have point clouds; choose with topic" if topics else "has no point clouds"
@@ -182,6 +183,7 @@ class LogReader:
             RecordingError: there are none.
             UsageError: several topics or frames fit, or the one that was chosen does not.
         """
+        self._check_open()
         track = poses_in(self._recording, topic, child, (self._span.start_ns, self._span.end_ns))
         self._notes.update(dict.fromkeys(track.notes))
         self._tell(track.losses)
@@ -193,9 +195,14 @@ class LogReader:
         Raises:
             RecordingError: the log has no truth.
         """
+        self._check_open()
         if not self._recording.connections(TRUTH_POSE.topic):
             raise RecordingError(f"{self.path}: there is no {TRUTH_POSE.topic}; open a log with truth")
         return self.poses(TRUTH_POSE.topic)
+
+    def _check_open(self) -> None:
+        if not self.close.alive:
+            raise UsageError(f"{self.path}: the log is closed; read it before that, or open it again")
 
     @cached_property
     def _info(self) -> LogInfo:
@@ -204,6 +211,7 @@ class LogReader:
 
     def _log(self, choice: Choice) -> LayeredLog:
         """The log as stages see it, results included, its videos as images."""
+        self._check_open()
         log = RecordedLog(self._recording, replace(self._span, choice=choice))
         return log.layered([Layer(self._recording, self._recording.channels)])
 
@@ -228,12 +236,18 @@ class LogReader:
 
     def _decoded(self, log: LayeredLog, inputs: _Inputs) -> Iterator[tuple[str, int, Message]]:
         reading, topic = Reading(), min((entry.topic for entry in inputs), default="")
-        raws = log.messages(inputs, self._span.start_ns, self._span.end_ns)
         try:
-            for _, log_ns, message in decoded(raws, inputs, reading):
+            for _, log_ns, message in decoded(self._raws(log, inputs), inputs, reading):
                 yield topic, log_ns, message
         finally:
             self._finish(log, reading)
+
+    def _raws(self, log: LayeredLog, inputs: _Inputs) -> Iterator[RawMessage]:
+        """The messages of the span, for as long as the log is open."""
+        self._check_open()
+        for raw in log.messages(inputs, self._span.start_ns, self._span.end_ns):
+            yield raw
+            self._check_open()
 
     def _of(self, channel: Channel[M], topic: str | None) -> Iterator[tuple[int, M]]:
         """Log time and message of each; those that grow are read as the log defines them."""
@@ -244,7 +258,7 @@ class LogReader:
             return
         reading = Reading()
         schemas = {entry: entry.schema.decode(errors="replace") for entry in inputs}
-        for raw in log.messages(inputs, self._span.start_ns, self._span.end_ns):
+        for raw in self._raws(log, inputs):
             try:
                 yield raw.log_time_ns, decode(channel.message, raw.data, schemas[raw.connection])
             except MessageError as error:

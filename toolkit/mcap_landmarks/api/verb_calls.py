@@ -17,6 +17,7 @@ from mcap_landmarks.diff.set_document import SetDocument
 from mcap_landmarks.diff.sets import diff_sets
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.evaluation.evaluate import Association, evaluate_file, pairing_by
+from mcap_landmarks.locations import to_read
 from mcap_landmarks.recording.reader import reading_from_front
 from mcap_landmarks.runs.build_map import build_map_of
 from mcap_landmarks.runs.config_text import toml_value
@@ -98,10 +99,12 @@ def build_map(
 
     `prior` is a database to extend. For the rest see `localize`.
     """
-    database, target = check_target(place(map_file)), maybe_place(output)
+    database, target = check_target(place(map_file, "map_file")), maybe_place(output, "output")
     asked = _with(options, {"build_map.fixed": True} if fixed else {})
     with _reading(asked):
-        found = build_map_of(_options(asked, None).requests(places(logs)), database, target, maybe_place(prior))
+        found = build_map_of(
+            _options(asked, None).requests(places(logs, "logs")), database, target, maybe_place(prior, "prior")
+        )
     for log in found.logs:
         tell(log.recording, log.outcome.losses)
     return found
@@ -126,8 +129,13 @@ def evaluate(
         UsageError: there is no truth, or the poses cannot be aligned.
     """
     with reading_from_front() if lenient else nullcontext():
-        found = evaluate_file(place(result), maybe_place(reference), pairing_by(association, max_gap), aligned=align)
-    tell(place(result), found.losses)
+        found = evaluate_file(
+            place(result, "result"),
+            maybe_place(reference, "reference"),
+            pairing_by(association, max_gap),
+            aligned=align,
+        )
+    tell(place(result, "result"), found.losses)
     return EvaluationResult.of(found, aligned=align)
 
 
@@ -150,10 +158,13 @@ def diff(
         ToolkitError: a file cannot be read, they cannot be compared, or a tolerance or condition is wrong.
     """
     conditions = [parse(text) for text in texts(fail_on)]
+    sides, truth = (place(baseline, "baseline"), place(candidate, "candidate")), maybe_place(reference, "reference")
+    for side in sides:
+        if to_read(side).is_dir():
+            raise UsageError(f"{side} is a folder; compare folders with diff_folders")
     with reading_from_front() if lenient else nullcontext():
-        sides, truth = (place(baseline), place(candidate)), maybe_place(reference)
-        found = compare(*sides, pairs(tolerance), conditions, reference=truth, aligned=align)
-    tell(place(candidate), found.losses)
+        found = compare(*sides, pairs(tolerance, "tolerance"), conditions, reference=truth, aligned=align)
+    tell(place(candidate, "candidate"), found.losses)
     return found
 
 
@@ -172,9 +183,15 @@ def diff_folders(
     Raises:
         ToolkitError: no log is in both, or a file cannot be read.
     """
-    rules = None if criteria is None else read_criteria(place(criteria))
+    rules = None if criteria is None else read_criteria(place(criteria, "criteria"))
     conditions = [parse(text) for text in texts(fail_on)]
-    return diff_sets(place(baseline), place(candidate), rules, conditions, reference=maybe_place(reference))
+    return diff_sets(
+        place(baseline, "baseline"),
+        place(candidate, "candidate"),
+        rules,
+        conditions,
+        reference=maybe_place(reference, "reference"),
+    )
 
 
 def diff_drives(
@@ -190,8 +207,13 @@ def diff_drives(
         ToolkitError: a file cannot be read, or a condition is wrong.
     """
     conditions = [parse(text) for text in texts(fail_on)]
-    found = compare_drives(place(baseline), place(candidate), conditions, reference=maybe_place(reference))
-    tell(place(candidate), found.losses)
+    found = compare_drives(
+        place(baseline, "baseline"),
+        place(candidate, "candidate"),
+        conditions,
+        reference=maybe_place(reference, "reference"),
+    )
+    tell(place(candidate, "candidate"), found.losses)
     return found
 
 
@@ -208,8 +230,8 @@ def _run(
     if not stages:
         raise UsageError("no stage is named; name for example detect, cluster and fuse")
     with _reading(options):
-        requests = _options(options, map_file).requests([place(log)])
-        (found,) = run_logs(requests, place(output), stages, verb, lacking=lacking)
+        requests = _options(options, map_file).requests([place(log, "log")])
+        (found,) = run_logs(requests, place(output, "output"), stages, verb, lacking=lacking)
     tell(found.recording, found.losses)
     return found
 
@@ -228,16 +250,16 @@ def _options(given: Options, map_file: AnyPath | None) -> RunOptions:
     if unknown:
         raise TypeError(f"{unknown[0]} is no option; there are {', '.join(sorted(Options.__annotations__))}")
     own = {"model": given.get("model"), "names": given.get("names"), "extrinsics": given.get("extrinsics")}
-    files = {name: maybe_place(path) for name, path in {**own, "map": map_file}.items()}
+    files = {name: maybe_place(path, name) for name, path in own.items()} | {"map": maybe_place(map_file, "map_file")}
     heights = given.get("heights")
     return RunOptions(
-        maybe_place(given.get("config")),
+        maybe_place(given.get("config"), "config"),
         [f"{key}={toml_value(value)}" for key, value in given.get("settings", {}).items()],
         given.get("method"),
         moment_text(given.get("start"), "start"),
         moment_text(given.get("end"), "end"),
-        pairs(given.get("remap")),
-        pairs(given.get("time_offset")),
+        pairs(given.get("remap"), "remap"),
+        pairs(given.get("time_offset"), "time_offset"),
         given.get("odom"),
         texts(given.get("image")),
         given.get("image_rate"),

@@ -6,6 +6,8 @@ from mcap_landmarks.maps.database import read_map, write_map
 from mcap_landmarks.maps.exchange import SUFFIXES, export_map, format_of, import_map
 from mcap_landmarks.maps.model import LandmarkMap
 
+_DATABASE = ".db"
+
 
 def read_map_file(path: Location) -> LandmarkMap:
     """The map in a landmark database, or in a file that `landmarks import` takes.
@@ -20,9 +22,12 @@ def write_map_file(path: Location, landmark_map: LandmarkMap, *, overwrite: bool
     """Write a map as a landmark database, or as `landmarks export` does, whole or not at all.
 
     Raises:
-        UsageError: there is a file already that is not to be overwritten.
+        UsageError: the name stands for no format, or there is a file already that is not to be overwritten.
         ToolkitError: the map has not what the format needs, or the file cannot be written.
     """
+    if path.suffix.lower() not in {_DATABASE, *SUFFIXES}:
+        known = ", ".join([_DATABASE, *SUFFIXES])
+        raise UsageError(f"{path}: the name does not tell the format; let it end in one of {known}")
     if to_write(path).exists() and not overwrite:
         raise UsageError(f"{path}: there is a file already; give overwrite=True, or another name")
     if path.suffix.lower() in SUFFIXES:

@@ -120,10 +120,10 @@ class LandmarkMap:
         return read_map_file(location(path))
 
     def write(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write the map as a landmark database, or as `landmarks export` does (.csv, .json, .txt).
+        """Write the map as a landmark database (.db), or as `landmarks export` does (.csv, .json, .txt).
 
         Raises:
-            UsageError: there is a file already that is not to be overwritten.
+            UsageError: the name ends in none of these, or there is a file already that is not to be overwritten.
             ToolkitError: the map has not what the format needs, or the file cannot be written.
         """
         from mcap_landmarks.maps.map_files import write_map_file  # noqa: PLC0415 - it imports this
