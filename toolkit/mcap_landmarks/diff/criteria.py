@@ -1,6 +1,7 @@
 """What a comparison of two sets of runs asks of each figure: built in, or as a TOML file says over it."""
 
 import dataclasses
+import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -154,8 +155,16 @@ def _criterion(path: Location, name: str, keys: Mapping[str, object]) -> Criteri
 
 def _validated(path: Location, adapter: TypeAdapter[_T], values: Mapping[str, object], prefix: str) -> _T:
     try:
-        return adapter.validate_python(dict(values), strict=True)
+        # As JSON, where strictness is of numbers, truths and texts alone: in Python it would refuse tables, too.
+        return adapter.validate_json(json.dumps(values, default=_plain), strict=True)
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         raise UsageError(f"{path}: {prefix}{key} = {first['input']!r}: {first['msg']}") from error
+
+
+def _plain(value: object) -> object:
+    """What TOML has and JSON has not: criteria that were checked before, and dates, which no criterion is."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return dataclasses.asdict(value)
+    return str(value)
