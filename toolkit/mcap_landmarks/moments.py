@@ -27,7 +27,7 @@ def time_ns(text: str | None, option: str) -> int | None:
     """
     if text is None:
         return None
-    if text.lstrip("-").isdigit():
+    if re.fullmatch(r"-?[0-9]{1,19}", text):  # more digits are of no time that a log can hold
         return int(text)
     try:
         when = datetime.fromisoformat(text)
@@ -36,5 +36,5 @@ def time_ns(text: str | None, option: str) -> int | None:
     if when is None or when.tzinfo is None:
         raise UsageError(f"{option} {text}: give RFC 3339 with an offset, such as 2026-01-31T12:00:00Z, or nanoseconds")
     whole = when.replace(microsecond=0)
-    fraction = re.search(r"[.,](\d+)", text)  # datetime keeps microseconds only
+    fraction = re.search(r"[.,]([0-9]+)", text)  # datetime keeps microseconds only
     return int(whole.timestamp()) * 10**9 + (int(fraction[1].ljust(9, "0")[:9]) if fraction else 0)

@@ -31,7 +31,7 @@ def storage_files(folder: Path) -> list[Path]:
 
 def _number(path: Path) -> tuple[int, str, int]:
     stem, _, number = path.name.split(".")[0].rpartition("_")
-    return (0, stem, int(number)) if number.isdigit() else (1, path.name, 0)
+    return (0, stem, int(number)) if number.isdecimal() else (1, path.name, 0)
 
 
 def single_file(path: Path) -> BagFiles:
