@@ -71,5 +71,8 @@ def test_the_same_runs_and_two_maps_have_a_page(tmp_path: Path, capsys: pytest.C
     assert call("report", log, log, "--diff", "-o", page) == 0
     assert "The two files are equal byte by byte." in page.read_text()
     assert call("report", golden / "map.db", golden / "map.db", "--diff", "-o", page, "--overwrite") == 0
+    text = page.read_text()
+    assert ">The map</h2>" in text
+    assert "that both runs have" not in text
     assert call("report", log, "--diff", "-o", page) == 2
     assert "BASELINE and CANDIDATE, not of 1" in capsys.readouterr().err

@@ -20,7 +20,7 @@ def test_a_table_of_all_sorts_and_opens_sections(browser: Browser, tmp_path: Pat
         page = watched.page
         names = page.locator("#logs tbody th")
         expect(names).to_have_text(["half.mcap", "blind.mcap", "localize.mcap"])  # one false pose, two failures, none
-        head = page.locator("#logs thead th").nth(1)
+        head = page.locator("#logs thead th").nth(4)
         head.locator("button").focus()
         page.keyboard.press("Enter")
         expect(head).to_have_attribute("aria-sort", "ascending")
@@ -43,3 +43,13 @@ def test_a_log_that_cannot_be_read_is_told_and_the_others_shown(
     assert "broken.mcap could not be read" in page.read_text()
     assert call("report", tmp_path / "broken.mcap", tmp_path / "broken.mcap", "-o", tmp_path / "none.html") == 1
     assert "none of 2 results can be read" in capsys.readouterr().err
+
+
+def test_a_map_is_a_result_but_no_log(tmp_path: Path) -> None:
+    log, page = localized_log(tmp_path / "my log.mcap"), tmp_path / "fleet.html"
+    assert call("report", log, GOLDEN.parent / "map.db", "-o", page) == 0
+    text = page.read_text()
+    assert "in 1 log were localized" in text
+    assert "1 result has no bundles." in text
+    assert "1 log with bundles" in text
+    assert f"report &#39;{log}&#39; -o &#39;my log.html&#39;" in text

@@ -11,7 +11,7 @@ from mcap_landmarks.report.page.html_page import html_page
 from mcap_landmarks.report.page.paged_result import PagedResult
 from mcap_landmarks.report.page.result_document import DrawnResult, result_document
 from mcap_landmarks.report.page.result_page import MadePage, Row, status_names
-from mcap_landmarks.report.page.result_words import metres, share
+from mcap_landmarks.report.page.result_words import map_words, metres, share
 from mcap_landmarks.wording import counted
 
 _SHOWN = 60
@@ -30,6 +30,8 @@ def diff_page(
     drawn = [result_document(side, wanted, share=0.5) for side in (baseline, candidate)]
     start_ns = min(int(str(one.document["start_ns"])) for one in drawn)
     values = {
+        **map_words([baseline, candidate]),
+        "is_of_maps": _landmarks(document) is not None,
         "title": f"{baseline.name} → {candidate.name}",
         "verdict": _verdict(document, changes),
         "tiles": _tiles(baseline, candidate),
@@ -88,6 +90,9 @@ def _verdict(document: DiffDocument, changes: Sequence[BundleChange]) -> str:
         return "The two files are equal byte by byte."
     if document["verdict"] == "same" and not changes:
         return "The same: nothing differs beyond the tolerances of the stages."
+    landmarks = _landmarks(document)
+    if landmarks is not None:
+        return _map_verdict(landmarks)
     kinds = Counter(one.rank for one in changes)
     farthest = max((one.moved_m or 0.0 for one in changes), default=0.0)
     told = [
@@ -103,6 +108,23 @@ def _verdict(document: DiffDocument, changes: Sequence[BundleChange]) -> str:
     return f"{bundles} {differing} of {counted(len(document['channels']), 'channel')} differ."
 
 
+def _landmarks(document: DiffDocument) -> ChannelEntry | None:
+    """What differs in the landmarks of two databases; None where logs were compared."""
+    entry = document["channels"].get("landmarks")
+    return entry if entry is not None and entry["type"] == "landmark" else None
+
+
+def _map_verdict(landmarks: ChannelEntry) -> str:
+    """How many landmarks went, came, moved and differ otherwise from one database to the other."""
+    moved = landmarks["fields"]["position_m"]["changed"] if "position_m" in landmarks["fields"] else 0
+    whole = landmarks["same"] + landmarks["changed"] + landmarks["removed"]
+    said = (
+        f"Of {counted(whole, 'landmark')} {landmarks['removed']} went and {moved} moved; {landmarks['added']} came new."
+    )
+    otherwise = landmarks["changed"] - moved
+    return f"{said} {otherwise} differ otherwise." if otherwise else said
+
+
 def _tiles(baseline: PagedResult, candidate: PagedResult) -> list[tuple[str, str, str, bool]]:
     """The first figures of both, and whether they became worse."""
     mine, theirs = baseline.evaluation, candidate.evaluation
@@ -111,7 +133,7 @@ def _tiles(baseline: PagedResult, candidate: PagedResult) -> list[tuple[str, str
         both = mine["statuses"], theirs["statuses"]
         counts = [statuses["localized"] for statuses in both]
         words = [share(statuses["localized"], sum(statuses.values())) for statuses in both]
-        found.append(("localized", words[1], f"was {words[0]}", counts[1] < counts[0]))
+        found.append(("localized of all", words[1], f"was {words[0]}", counts[1] < counts[0]))
     if mine["scored"] and theirs["scored"]:
         for name, key in (("position RMSE", "rmse_m"), ("median", "median_m"), ("worst position", "max_m")):
             before, after = mine["position"][key], theirs["position"][key]

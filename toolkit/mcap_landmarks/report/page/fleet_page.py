@@ -1,5 +1,6 @@
 """The page of many results: a table to sort, the worst first, the figures of the fleet, a section for each log."""
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
@@ -14,11 +15,11 @@ from mcap_landmarks.report.page.thumbnail import thumbnail
 from mcap_landmarks.wording import counted
 
 HEAD = (
-    ("log", "text"),
-    ("bundles", "number"),
-    ("localized", "number"),
+    ("result", "text"),
     ("false", "number"),
     ("RMSE", "number"),
+    ("localized of all", "number"),
+    ("bundles", "number"),
     ("worst", "number"),
     ("heading RMSE", "number"),
     ("NEES", "number"),
@@ -43,6 +44,7 @@ def fleet_page(results: Sequence[PagedResult], unread: Sequence[UnreadResult], m
         "tiles": _tiles(ordered),
         "missing": [
             *(f"{one.name} could not be read: {one.reason}." for one in unread),
+            *(f"Not all of {one.name} could be read: {loss}." for one in ordered for loss in one.losses),
             *filter(None, map(off_by_frame, ordered)),
         ],
         "head": HEAD,
@@ -64,6 +66,11 @@ def _localized(result: PagedResult) -> tuple[int, int]:
     return statuses["localized"], sum(statuses.values())
 
 
+def _noun(results: Sequence[PagedResult]) -> str:
+    """What results are called: logs if all have bundles, which a map has not."""
+    return "log" if all(_localized(one)[1] for one in results) else "result"
+
+
 def _badness(result: PagedResult) -> tuple[float, float, float, str]:
     """The worst first: false poses, then the share that is not localized, then the error."""
     figures, (localized, whole) = result.evaluation, _localized(result)
@@ -76,35 +83,49 @@ def _badness(result: PagedResult) -> tuple[float, float, float, str]:
 
 
 def _verdict(results: Sequence[PagedResult]) -> str:
-    pairs = [_localized(one) for one in results]
-    localized, whole = (sum(column) for column in zip(*pairs, strict=True)) if pairs else (0, 0)
-    logs = counted(len(results), "log")
-    said = [f"{localized} of {counted(whole, 'bundle')} in {logs} were localized ({share(localized, whole)})."]
+    said = _counted(results)
     scored = sum(one.evaluation["scored"] for one in results)
     false = [round(one.evaluation["false"]["count"] or 0) for one in results]
     if sum(false):
-        where = counted(sum(map(bool, false)), "log")
+        where = counted(sum(map(bool, false)), _noun(results))
         said.append(f"{sum(false)} of {scored} poses with a truth are false, in {where}.")
     elif scored:
         said.append("None is false.")
     return " ".join(said)
 
 
+def _counted(results: Sequence[PagedResult]) -> list[str]:
+    """How many bundles of all were localized, and how many results have none."""
+    pairs = [pair for pair in map(_localized, results) if pair[1]]
+    said, others = list[str](), len(results) - len(pairs)
+    if pairs:
+        localized, whole = (sum(column) for column in zip(*pairs, strict=True))
+        logs = counted(len(pairs), "log")
+        said.append(f"{localized} of {counted(whole, 'bundle')} in {logs} were localized ({share(localized, whole)}).")
+    if others:
+        said.append(f"{counted(others, 'result')} {'has' if others == 1 else 'have'} no bundles.")
+    return said
+
+
 def _tiles(results: Sequence[PagedResult]) -> list[tuple[str, str, str, bool]]:
     shares = [localized / whole for localized, whole in map(_localized, results) if whole]
     off = [one.evaluation["position"]["rmse_m"] for one in results]
     rmse = [value for value in off if value is not None]
-    found: list[tuple[str, str, str, bool]] = [("logs", str(len(results)), "", False)]
+    noun = _noun(results)
+    of_them = "" if noun == "log" else f"{counted(len(shares), 'log')} with bundles"
+    found: list[tuple[str, str, str, bool]] = [(f"{noun}s", str(len(results)), of_them, False)]
     if shares:
         found.append(
-            ("localized, median log", f"{100 * median(shares):.1f} %", f"worst {100 * min(shares):.1f} %", False)
+            ("localized of all, median log", f"{100 * median(shares):.1f} %", f"worst {100 * min(shares):.1f} %", False)
         )
         whole = sum(part == 1.0 for part in shares)
         found.append(("all bundles localized", str(whole), f"of {counted(len(shares), 'log')}", False))
     if rmse:
-        found.append(("RMSE, median log", metres(median(rmse)), f"worst {metres(max(rmse))}", False))
+        found.append((f"RMSE, median {noun}", metres(median(rmse)), f"worst {metres(max(rmse))}", False))
         false = sum(bool(one.evaluation["false"]["count"]) for one in results)
-        found.append(("logs with false poses", str(false), f"of {counted(len(rmse), 'log')} with a truth", false > 0))
+        found.append(
+            (f"{noun}s with false poses", str(false), f"of {counted(len(rmse), noun)} with a truth", false > 0)
+        )
     return found
 
 
@@ -116,10 +137,11 @@ def _row(place: int, result: PagedResult) -> dict[str, object]:
     failures = _most_failures(result)
     cells = [
         (result.name, result.name),
-        (str(whole), str(whole)),
-        (share(localized, whole), f"{localized / whole:.6f}" if whole else ""),
         (f"{false:.0f}" if scored else "–", f"{false:.0f}" if scored else ""),
-        *((metres(position[key]), _value(position[key])) for key in ("rmse_m", "max_m")),
+        (metres(position["rmse_m"]), _value(position["rmse_m"])),
+        (share(localized, whole), f"{localized / whole:.6f}" if whole else ""),
+        (str(whole), str(whole)),
+        (metres(position["max_m"]), _value(position["max_m"])),
         ("–" if heading is None else f"{heading:.2f}°", _value(heading)),
         ("–" if figures["nees"] is None else f"{figures['nees']:.2f}", _value(figures["nees"])),
         (failures or "–", failures),
@@ -147,6 +169,6 @@ def _section(result: PagedResult) -> dict[str, object]:
         "about": about(result),
         "rows": rows,
         "missing": [f"Not all of the file could be read: {loss}." for loss in result.losses],
-        "command": f"mcap-landmarks report {result.path.name} -o {result.path.stem}.html",
+        "command": shlex.join(["mcap-landmarks", "report", str(result.path), "-o", f"{result.path.stem}.html"]),
         **thumbnail(result),
     }

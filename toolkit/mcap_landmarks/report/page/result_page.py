@@ -14,7 +14,7 @@ from mcap_landmarks.report.page.chosen_bundles import evenly
 from mcap_landmarks.report.page.html_page import html_page
 from mcap_landmarks.report.page.paged_result import PagedResult
 from mcap_landmarks.report.page.result_document import KeptCounts, result_document
-from mcap_landmarks.report.page.result_words import TIMINGS, about, metres, missing, share, verdict
+from mcap_landmarks.report.page.result_words import TIMINGS, about, map_words, metres, missing, share, verdict
 from mcap_landmarks.report.page.stage_seconds import StageSeconds
 
 _POSITIONS = 200
@@ -36,6 +36,7 @@ def result_page(result: PagedResult, mark: str, seconds: StageSeconds) -> MadePa
     """The page of a result; see `html_page` for the mark."""
     document, counts, thinned = result_document(result)
     values = {
+        **map_words([result]),
         "title": result.name,
         "verdict": verdict(result),
         "about": about(result),

@@ -14,6 +14,13 @@ TIMINGS = (
     "How long the stages took is not known: a result holds no times of the clock, so that the same input gives the "
     "same bytes. What the run printed with --json has them: give it with --run FILE."
 )
+_LEGEND = (
+    "thick line: the truth",
+    "thin: the estimate",
+    "dashed: odometry",
+    "ellipses: 95 % regions",
+    "rings: true objects",
+)
 
 
 def verdict(result: PagedResult) -> str:
@@ -99,6 +106,26 @@ def missing(result: PagedResult, losses: Sequence[str] = ()) -> list[str]:
         said.append("There is no map in the log, so no landmarks are drawn: localize and map write theirs.")
     note = off_by_frame(result)
     return [*said, note] if note else said
+
+
+def map_words(results: Sequence[PagedResult]) -> dict[str, str]:
+    """The title of the section with the map, and what its lines and marks are: only those that it has."""
+    has_paths = any(one.drawn is not None for one in results)
+    is_drive = has_paths or any(len(one.bundles) for one in results)
+    words = "; ".join(text for text in _LEGEND if any(text in _drawn(one) for one in results))
+    legend = f"{words[:1].upper()}{words[1:]}." if words else ""
+    if len(results) > 1:
+        legend += " Of the baseline marks are open" + (" and the line is dotted." if has_paths else ".")
+    return {"map_title": "The drive" if is_drive else "The map", "map_legend": legend.strip()}
+
+
+def _drawn(result: PagedResult) -> list[str]:
+    """Which of the legend's lines and marks a result has."""
+    drawing, drawn = result.drawing, result.drawn
+    has_regions = drawing.landmarks is not None and bool(drawing.landmarks.covariances.any())
+    has_truth = drawn is not None and drawn.truth is not None
+    has = has_truth, drawn is not None, result.odometry is not None, has_regions or drawn is not None
+    return [text for text, is_there in zip(_LEGEND, (*has, drawing.objects is not None), strict=True) if is_there]
 
 
 def off_by_frame(result: PagedResult) -> str | None:

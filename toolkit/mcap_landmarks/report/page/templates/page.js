@@ -208,9 +208,8 @@ function conditionList(conditions) {
 }
 
 function table(head, rows, name) {
-  const cells = (kind, values) => values.map((value) => node(kind, kind === "th" ? { scope: "col" } : {}, value));
-  const body = rows.map((row) => node("tr", {}, ...cells("td", row)));
-  return node("div", { class: "wide", tabindex: "0", role: "region", "aria-label": name }, node("table", {}, node("thead", {}, node("tr", {}, ...cells("th", head))), node("tbody", {}, ...body)));
+  const body = rows.map((row) => node("tr", {}, ...row.map((value) => node("td", { class: value.length > 8 && !/ m$|°$/.test(value) ? "long" : null }, value))));
+  return node("div", { class: "wide", tabindex: "0", role: "region", "aria-label": name }, node("table", {}, node("thead", {}, node("tr", {}, ...head.map((value) => node("th", { scope: "col" }, value)))), node("tbody", {}, ...body)));
 }
 
 function objectTable(objects) {
