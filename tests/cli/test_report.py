@@ -78,3 +78,10 @@ def test_what_a_run_printed_tells_how_long_its_stages_took(tmp_path: Path, capsy
     assert "The stages that ran took 3.2 s." in page.read_text()
     assert "is of one result" in refused(capsys, 2, "report", log, log, "-o", page, "--run", printed)
     assert "cannot be read as JSON" in refused(capsys, 2, "report", log, "-o", page, "--run", log)
+
+
+def test_two_runs_that_were_moved_onto_the_truth_have_the_figures_behind_that(tmp_path: Path) -> None:
+    logs = [localized_log(tmp_path / name) for name in ("a.mcap", "b.mcap")]
+    for align, words in (((), 0), (("--align",), 1)):
+        assert call("report", *logs, "--diff", *align, "-o", tmp_path / f"{words}.html") == 0
+        assert ("alignment.x_m" in (tmp_path / f"{words}.html").read_text()) is bool(words)

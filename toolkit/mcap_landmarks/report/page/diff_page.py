@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mcap_landmarks.diff.document import ChannelEntry, DiffDocument
+from mcap_landmarks.diff.metric_rows import flat, side_by_side
 from mcap_landmarks.report.page.bundle_changes import BundleChange, bundle_changes
 from mcap_landmarks.report.page.html_page import html_page
 from mcap_landmarks.report.page.paged_result import PagedResult
@@ -40,6 +41,7 @@ def diff_page(
         "has_errors": any(one.document["errors"] for one in drawn),
         **_listed(changes, start_ns),
         **_tables(document),
+        "metrics": _metrics(document, baseline, candidate),
         "thinned": _thinned(drawn),
     }
     data = {
@@ -53,14 +55,20 @@ def diff_page(
     return MadePage(page, [one.counts for one in drawn], _thinned(drawn))
 
 
+def _metrics(document: DiffDocument, baseline: PagedResult, candidate: PagedResult) -> list[list[str]]:
+    """The figures of both; where a side was moved onto the truth, its figures are those behind that."""
+    rows = document["metrics"]
+    if baseline.evaluation["alignment"] or candidate.evaluation["alignment"]:
+        rows = side_by_side(flat(baseline.evaluation), flat(candidate.evaluation))
+    return [
+        [name, _figure(row["baseline"]), _figure(row["candidate"]), _figure(row["delta"])] for name, row in rows.items()
+    ]
+
+
 def _tables(document: DiffDocument) -> dict[str, object]:
-    """The tables of what the diff found: figures, channels, single fields, and what was meant to differ."""
+    """The tables of what the diff found: channels, single fields, and what was meant to differ."""
     channels = {name: entry for name, entry in document["channels"].items() if _differs(entry)}
     return {
-        "metrics": [
-            [name, _figure(row["baseline"]), _figure(row["candidate"]), _figure(row["delta"])]
-            for name, row in document["metrics"].items()
-        ],
         "channels": [_channel(name, entry) for name, entry in channels.items()],
         "same_channels": len(document["channels"]) - len(channels),
         "cases": [case for name, entry in channels.items() for case in _cases(name, entry)],
