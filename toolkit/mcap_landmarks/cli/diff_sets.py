@@ -135,23 +135,13 @@ def _print_left_out(document: "SetDocument") -> None:
 
 
 def _print_verdicts(metrics: "dict[str, VerdictEntry]") -> None:
-    from mcap_landmarks.diff.set_text import change_in, confidence_of, interval_of, margin_of, telling, value_of
+    from mcap_landmarks.diff.set_text import FIGURE_HEAD, figure_cells, telling
 
     shown, others = telling(metrics)
-    head = ["verdict", "confidence", "baseline", "candidate", "change", "between", "margin", "logs"]
+    head = ["verdict", *FIGURE_HEAD]
     for title, gates in (("metrics that gate", True), ("other metrics", False)):
         rows = [
-            [
-                name,
-                entry["verdict"],
-                confidence_of(entry),
-                value_of(entry["baseline"]),
-                value_of(entry["candidate"]),
-                change_in(entry),
-                interval_of(entry),
-                margin_of(entry),
-                str(entry["logs"]),
-            ]
+            [name, entry["verdict"], *figure_cells(entry)]
             for name, entry in ((name, metrics[name]) for name in shown)
             if entry["gates"] == gates
         ]

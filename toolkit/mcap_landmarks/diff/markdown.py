@@ -5,14 +5,11 @@ from collections.abc import Sequence
 
 from mcap_landmarks.diff.set_document import SetDocument
 from mcap_landmarks.diff.set_text import (
-    change_in,
-    confidence_of,
+    FIGURE_HEAD,
     failures_of,
-    interval_of,
+    figure_cells,
     left_out_of,
-    margin_of,
     telling,
-    value_of,
     worst_of,
 )
 from mcap_landmarks.wording import counted
@@ -56,17 +53,11 @@ def _metrics(document: SetDocument) -> list[str]:
         [
             code(name) + ("" if entry["gates"] else " (does not gate)"),
             f"**{entry['verdict']}**" if entry["fails"] else entry["verdict"],
-            confidence_of(entry),
-            value_of(entry["baseline"]),
-            value_of(entry["candidate"]),
-            change_in(entry),
-            interval_of(entry),
-            margin_of(entry),
-            str(entry["logs"]),
+            *figure_cells(entry),
         ]
         for name, entry in ((name, metrics[name]) for name in shown)
     ]
-    head = ["metric", "verdict", "confidence", "baseline", "candidate", "change", "between", "margin", "logs"]
+    head = ["metric", "verdict", *FIGURE_HEAD]
     gating = [metrics[name]["note"] for name in shown if metrics[name]["gates"]]
     notes = [note for note in dict.fromkeys(gating) if note]
     if others:

@@ -6,6 +6,9 @@ from mcap_landmarks.diff.criteria import METRICS
 from mcap_landmarks.diff.set_document import LogEntry, SetDocument, VerdictEntry
 from mcap_landmarks.wording import counted
 
+FIGURE_HEAD = ("confidence", "baseline", "candidate", "change", "between", "margin", "logs")
+"""The head of what `figure_cells` gives."""
+
 
 def value_of(value: float | None) -> str:
     """A figure, a dash where it is unknown."""
@@ -89,3 +92,9 @@ def worst_of(log: LogEntry) -> tuple[str, str, str, str] | None:
     change = entry["change"]
     told = "lost" if change is None else change_of(change, relative=METRICS[name].relative)
     return name, value_of(entry["baseline"]), value_of(entry["candidate"]), told
+
+
+def figure_cells(entry: VerdictEntry) -> list[str]:
+    """What a table says of a figure beside its verdict, under `FIGURE_HEAD`."""
+    values = [value_of(entry["baseline"]), value_of(entry["candidate"])]
+    return [confidence_of(entry), *values, change_in(entry), interval_of(entry), margin_of(entry), str(entry["logs"])]
