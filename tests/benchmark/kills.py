@@ -1,9 +1,10 @@
-"""Verbs killed at random moments: `python -m tests.benchmark.kills [--json] [--quick]`.
+"""Verbs killed at random moments: `python -m tests.benchmark.kills [--json] [--quick] [--resume FILE]`.
 
 After each `kill -9` the inputs are as before, every output is the old one or a whole new one, and a database opens. The
 same command again ends as one that nobody killed does, with the same files of the same bytes, and no other file.
 """
 
+import argparse
 import os
 import shutil
 import sqlite3
@@ -22,6 +23,7 @@ from mcap_landmarks.cli.main import run
 from mcap_landmarks.maps.database import read_map
 
 from tests.benchmark import container_logs as logs
+from tests.benchmark.kept import Kept
 from tests.benchmark.rows import Row, main
 
 _RNG_SEED = 9
@@ -67,15 +69,16 @@ CASES = (
 )
 
 
-def measure(quick: bool) -> Iterator[Row]:
-    """All rows; quick: five moments each instead of 50."""
+def measure(quick: bool, resume: Path | None = None) -> Iterator[Row]:
+    """All rows; quick: five moments each instead of 50. With `resume` the outcomes are kept there as they come."""
+    outcomes = Kept.of(resume)
     _CONTEXT.set_forkserver_preload([__name__, "mcap_landmarks.runs.pipeline", "mcap_landmarks.runs.convert"])
     with tempfile.TemporaryDirectory() as name:
         start = Path(name) / "start"
         start.mkdir()
         prepare(start)
         for case in CASES:
-            yield _row(case, start, Path(name) / "trial", 5 if quick else 50)
+            yield _row(case, start, Path(name) / "trial", 5 if quick else 50, outcomes)
 
 
 def prepare(folder: Path) -> None:
@@ -94,24 +97,34 @@ def prepare(folder: Path) -> None:
     _finish(folder, f"localize scenes.mcap --map site.db -o out.mcap {_SEEN}")
 
 
-def _row(case: Case, start: Path, trial: Path, kills: int) -> Row:
+def _row(case: Case, start: Path, trial: Path, kills: int, outcomes: Kept) -> Row:
     """How many kills did harm."""
     clean, code, seconds = _clean(case, start, trial)
-    moments = np.random.default_rng(_RNG_SEED).uniform(0, seconds, kills)
     harmful = unfinished = 0
-    for moment in moments.tolist():
-        before = _lay_out(case, start, trial)
-        _kill(trial, case.words, moment)
-        harm = _harm(case, before, clean, _files(trial))
-        unfinished += any(path.name.startswith(".") for path in trial.rglob("*"))
-        again = _finish(trial, case.words)
-        if again != code:
-            harm.append(f"the next run ends with {again}")
-        harm += [f"{path} is another or too much" for path in _differing(_files(trial), clean)]
+    for number, share in enumerate(np.random.default_rng(_RNG_SEED).uniform(size=kills).tolist()):
+        name = f"{case.name} {number}"
+        if name not in outcomes.known:
+            before = _lay_out(case, start, trial)
+            _kill(trial, case.words, share * seconds)
+            outcomes.add(name, _outcome(case, trial, before, clean, code))
+        harm, is_unfinished = outcomes.known[name]
+        unfinished += is_unfinished
+        harmful += bool(harm)
         if harm:
-            harmful += 1
-            print(f"{case.name}, killed after {moment:.3f} s: {'; '.join(harm)}", file=sys.stderr)
+            print(f"{case.name}, killed after {share:.1%} of its time: {'; '.join(harm)}", file=sys.stderr)
+    print(f"{case.name}: {kills} kills, {harmful} did harm, {unfinished} left something half done", file=sys.stderr)
     return Row(case.name, harmful, "harmful", at_most=0, cases=kills, peers={"left something half done": unfinished})
+
+
+def _outcome(case: Case, trial: Path, before: Files, clean: Files, code: int) -> tuple[list[str], bool]:
+    """What harm a kill did, seen by what it left and by the same command again; whether it left something half done."""
+    harm = _harm(case, before, clean, _files(trial))
+    is_unfinished = any(path.name.startswith(".") for path in trial.rglob("*"))
+    again = _finish(trial, case.words)
+    if again != code:
+        harm.append(f"the next run ends with {again}")
+    harm += [f"{path} is another or too much" for path in _differing(_files(trial), clean)]
+    return harm, is_unfinished
 
 
 def _clean(case: Case, start: Path, trial: Path) -> tuple[Files, int, float]:
@@ -189,5 +202,11 @@ def _kill(folder: Path, words: str, seconds: float) -> None:
     process.join()
 
 
+def _options() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--resume", type=Path, metavar="FILE", help="where outcomes are kept, to go on from")
+    return parser
+
+
 if __name__ == "__main__":
-    sys.exit(main(measure, "Verbs killed at random moments."))
+    sys.exit(main(measure, "Verbs killed at random moments.", _options()))
