@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import difflib
 import json
+import math
 import re
 import tomllib
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -141,7 +142,7 @@ def stage_config(config: type[_C], stage: str, settings: Mapping[str, object]) -
 
 
 def _all_taken(given: object, made: object, where: str) -> None:
-    """Refuse what is given below the first level and is nowhere in what was made of it."""
+    """Refuse what is given below the first level and is nowhere in what was made of it, and what only passes for it."""
     if isinstance(given, Mapping) and isinstance(made, Mapping):
         for key, value in given.items():
             _known(key, made, f"setting of {where}")
@@ -149,6 +150,15 @@ def _all_taken(given: object, made: object, where: str) -> None:
     elif isinstance(given, list) and isinstance(made, list | tuple):
         for i, (one, other) in enumerate(zip(given, made, strict=False)):
             _all_taken(one, other, f"{where}.{i}")
+    elif isinstance(made, bool | int | float):
+        _check_kind(given, made, where)
+
+
+def _check_kind(given: object, made: float, where: str) -> None:
+    """Refuse a text or a truth in place of a number, a number in place of a truth, and what is no number."""
+    is_truth = isinstance(made, bool)
+    if isinstance(given, str) or isinstance(given, bool) != is_truth or math.isnan(made):
+        raise UsageError(f"{where} = {given!r}: give {'true or false' if is_truth else 'a number'}")
 
 
 def effective(config: Config) -> dict[str, object]:
