@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.runs.batch import Task, find_logs, outputs_in, run_tasks
+from mcap_landmarks.runs.batch import ProcessTask, find_logs, outputs_in, run_tasks
 
 
-def task(script: str, name: str = "log.mcap") -> Task:
-    return Task(Path(name), Path("out.mcap"), (sys.executable, "-S", "-c", script))
+def task(script: str, name: str = "log.mcap") -> ProcessTask:
+    return ProcessTask(Path(name), Path("out.mcap"), (sys.executable, "-S", "-c", script))
 
 
 def nothing(_: int) -> None:
@@ -111,9 +111,9 @@ def test_outputs_are_named_as_their_logs(tmp_path: Path) -> None:
 ORPHANED = """
 import sys
 from pathlib import Path
-from mcap_landmarks.runs.batch import Task, run_tasks
+from mcap_landmarks.runs.batch import ProcessTask, run_tasks
 words = (sys.executable, "-c", "import os, sys; os.open(sys.argv[1], os.O_WRONLY); os.read(0, 1)", sys.argv[1])
-run_tasks([Task(Path("log"), Path("out"), words)], 1, print)
+run_tasks([ProcessTask(Path("log"), Path("out"), words)], 1, print)
 """
 
 

@@ -18,7 +18,7 @@ from mcap_landmarks.locations import Location, location
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mcap_landmarks.runs.batch import Ended, Task
+    from mcap_landmarks.runs.batch import ProcessEnd, ProcessTask
 
 context_settings = {"allow_extra_args": True, "ignore_unknown_options": True}
 _SUFFIX = {
@@ -84,13 +84,13 @@ def command(
         raise typer.Exit(PARTIAL)
 
 
-def _tasks(verb: str, words: Sequence[str], output: Location) -> "list[Task]":
+def _tasks(verb: str, words: Sequence[str], output: Location) -> "list[ProcessTask]":
     """What to run; the options are checked by the verb's own parser before anything runs.
 
     Raises:
         UsageError: the verb, an option or an output makes no sense.
     """
-    from mcap_landmarks.runs.batch import Task, find_logs, outputs_in
+    from mcap_landmarks.runs.batch import ProcessTask, find_logs, outputs_in
     from mcap_landmarks.runs.outputs import make_folder
 
     own = _command_of(verb)
@@ -103,14 +103,14 @@ def _tasks(verb: str, words: Sequence[str], output: Location) -> "list[Task]":
     tasks = []
     for log, target in outputs_in(make_folder(output), logs, _SUFFIX[verb]).items():
         where = {"map": ["--map", str(target)], "evaluate": []}.get(verb, ["-o", str(target)])
-        tasks.append(Task(log, target, (*_CALL, verb, str(log), *where, "--json", *passed)))
+        tasks.append(ProcessTask(log, target, (*_CALL, verb, str(log), *where, "--json", *passed)))
     own.make_context(verb, list(tasks[0].command[len(_CALL) + 1 :]))
     if verb == "evaluate":
         _check_documents(tasks, logs, overwrite="--overwrite" in passed)
     return tasks
 
 
-def _check_documents(tasks: "Sequence[Task]", logs: "Sequence[Path]", *, overwrite: bool) -> None:
+def _check_documents(tasks: "Sequence[ProcessTask]", logs: "Sequence[Path]", *, overwrite: bool) -> None:
     """Refuse to replace what is there by the documents that are kept here, before anything runs."""
     from mcap_landmarks.runs.replacing import new_files
 
@@ -150,7 +150,7 @@ def _split(verb: str, own: TyperCommand, words: Sequence[str]) -> tuple[list[str
     return patterns, passed
 
 
-def _report(verb: str, ended: "Ended") -> _Report:
+def _report(verb: str, ended: "ProcessEnd") -> _Report:
     outcome = {DONE: "done", PARTIAL: "partial"}.get(ended.exit_code, "failed")
     failed = outcome == "failed"
     if verb == "evaluate" and not failed:
@@ -168,7 +168,7 @@ def _report(verb: str, ended: "Ended") -> _Report:
     }
 
 
-def _document(ended: "Ended") -> object:
+def _document(ended: "ProcessEnd") -> object:
     """What a process printed, None if it was killed before that was whole."""
     try:
         return json.loads(ended.stdout)
@@ -176,14 +176,14 @@ def _document(ended: "Ended") -> object:
         return None
 
 
-def _last_words(verb: str, ended: "Ended") -> str:
+def _last_words(verb: str, ended: "ProcessEnd") -> str:
     """An error in place of the one that a process did not give."""
     how = f"was killed by signal {-ended.exit_code}" if ended.exit_code < 0 else f"ended with {ended.exit_code}"
     last = f": {ended.stderr.splitlines()[-1]}" if ended.stderr else ""
     return f"error: {ended.task.log}: {verb} {how}{last}"
 
 
-def _keep(ended: "Ended") -> None:
+def _keep(ended: "ProcessEnd") -> None:
     from mcap_landmarks.atomic import atomic_file
 
     with atomic_file(ended.task.output) as stream:

@@ -25,7 +25,7 @@ _LAST_WORDS_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class ProcessTask:
     """One log, where its result goes, and the command that makes it."""
 
     log: Path
@@ -34,10 +34,10 @@ class Task:
 
 
 @dataclass(frozen=True, slots=True)
-class Ended:
+class ProcessEnd:
     """How a task's process ended: its exit code, below zero the signal that killed it, and what it printed."""
 
-    task: Task
+    task: ProcessTask
     exit_code: int
     stdout: str
     stderr: str
@@ -95,7 +95,7 @@ def _holds_several(path: Path) -> bool:
         return False  # its own process says what is wrong with it
 
 
-def run_tasks(tasks: Sequence[Task], workers: int, progress: Callable[[int], None]) -> list[Ended]:
+def run_tasks(tasks: Sequence[ProcessTask], workers: int, progress: Callable[[int], None]) -> list[ProcessEnd]:
     """Run the tasks, so many at a time, and tell how each ended, in their order; `progress` gets 1 for each.
 
     Numeric libraries use one thread per process. On Ctrl-C or SIGTERM the running ones get the same and are waited for.
@@ -135,11 +135,11 @@ class _Processes:
         self._running: set[subprocess.Popen[str]] = set()
         self._stopped = False
 
-    def run(self, task: Task) -> Ended:
+    def run(self, task: ProcessTask) -> ProcessEnd:
         """Start a task's process and wait for its end; nothing is started once they were interrupted."""
         with self._lock:
             if self._stopped:
-                return Ended(task, -signal.SIGINT, "", "")
+                return ProcessEnd(task, -signal.SIGINT, "", "")
             process = subprocess.Popen(
                 task.command,
                 stdin=self._input,
@@ -154,7 +154,7 @@ class _Processes:
         stdout, stderr = process.communicate()
         with self._lock:
             self._running.discard(process)
-        return Ended(task, process.returncode, stdout, stderr)
+        return ProcessEnd(task, process.returncode, stdout, stderr)
 
     def interrupt(self, how: signal.Signals) -> None:
         """Let each process clean up and end; one that does not is killed."""

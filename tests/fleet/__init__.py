@@ -1,0 +1,1 @@
+"""Tests of `mcap_landmarks.fleet`."""
