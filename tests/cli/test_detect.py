@@ -232,3 +232,19 @@ def test_models_of_other_families_detect(tmp_path: Path, family: str) -> None:
         found = [decode(Detections, raw.data) for raw in raws]
     assert [one.boxes_xyxy.tolist() for one in found] == [[[14, 16, 46, 40]]] * 2  # eight pixels of margin above
     assert [one.hypotheses[0][0][0] for one in found] == ["car", "car"]
+
+
+def test_the_provider_that_ran_is_what_counts(
+    tmp_path: Path, model: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Results of two providers are not the same bytes, and `auto` may be either."""
+    detected(tmp_path, model, images(), "--json", "--set", "detect.provider=auto")
+    assert json.loads(capsys.readouterr().out)["stages"] == {"detect": "ran"}
+    with open_recording(tmp_path / "out.mcap") as recording:
+        assert json.loads(recording.metadata[RUN]["config"])["detect"]["provider"] == "cpu"
+    detected(tmp_path, model, images(), "--json")
+    assert json.loads(capsys.readouterr().out)["stages"] == {"detect": "reused"}
+    monkeypatch.setattr("mcap_landmarks.vision.providers.best_provider", lambda: "cuda")
+    log, out = tmp_path / "log.mcap", tmp_path / "out.mcap"
+    assert call("detect", log, "-o", out, "--model", model, "--set", "detect.provider=auto") == 2
+    assert "detect.provider = cuda: this onnxruntime has no CUDAExecutionProvider" in capsys.readouterr().err

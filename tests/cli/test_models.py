@@ -70,6 +70,7 @@ def test_a_network_is_checked_on_an_image_of_the_demo(tmp_path: Path, capsys: py
         ["the demo's first image"],
     )
     assert {box["class"] for box in found["detections"]} == {"fire hydrant", "person", "suitcase"}
+    assert found["runs_on"] == "cpu, one image at a time"
     assert found["speeds"][0]["threads"] == 1
     assert all(speed["ms"] > 0 for speed in found["speeds"])
     drawn = cv2.imread(str(tmp_path / "boxes.png"))

@@ -160,6 +160,30 @@ def test_results_come_in_the_order_of_the_images(tmp_path: Path) -> None:
         np.testing.assert_array_equal(message.boxes_xyxy, single.message.boxes_xyxy)
 
 
+def test_several_images_in_one_call_have_the_same_detections(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a GPU, with one that cannot be read and tiles of another size between them."""
+    yolov5(tmp_path / "m.onnx", ["a", "b"], export=Export("h", "w", form="heads", batch="images"))
+    rng = np.random.default_rng(0)
+    images = [bundle(5, CompressedImage(5, "camera", "jpeg", b"\xff\xd8 cut"))]
+    for i, width in enumerate((64, 96, 64, 64, 200, 64, 96)):
+        data = cv2.imencode(".png", rng.integers(0, 256, (64, width, 3), dtype=np.uint8))[1].tobytes()
+        images.append(bundle(i + 10, CompressedImage(i + 10, "camera", "png", data)))
+    asked = {"size_px": 64, "tiles": "auto", "confidence": 0.3}
+    alone = run({"model": tmp_path / "m.onnx"}, images, **asked)
+    monkeypatch.setattr(detect, "images_at_once", lambda _, wanted: wanted)
+    together = run({"model": tmp_path / "m.onnx"}, images, batch=3, **asked)
+    assert [one.log_time_ns for one in together] == [one.log_time_ns for one in alone]
+    for one, other in zip(alone, together, strict=True):
+        if isinstance(one, Stamped) and isinstance(one.message, Detections):
+            assert isinstance(other, Stamped)
+            assert isinstance(other.message, Detections)
+            assert len(one.message.hypotheses) > 0
+            assert [[name for name, _ in options] for options in one.message.hypotheses] == [
+                [name for name, _ in options] for options in other.message.hypotheses
+            ]
+            np.testing.assert_allclose(one.message.boxes_xyxy, other.message.boxes_xyxy, atol=1e-3)
+
+
 def classifier(folder: Path, shares: list[float], metadata: Mapping[str, str] = NAMES) -> Path:
     return answering(folder / "classes.onnx", {"output": np.array([shares], np.float32)}, metadata)
 

@@ -23,10 +23,11 @@ Side = int | str
 
 @dataclass(frozen=True, slots=True)
 class Export:
-    """How a network is written. Sides that are words are free."""
+    """How a network is written. Sides, and a number of images, that are words are free."""
 
     height: Side = 640
     width: Side = 640
+    batch: Side = 1
     form: Form = "decoded"
     half: bool = False
     int8: bool = False
@@ -164,7 +165,7 @@ def yolov5(
     kind = TensorProto.FLOAT16 if export.half else TensorProto.FLOAT
     ranks = {"decoded": 3, "heads": 5, "planes": 4}
     free = [helper.make_tensor_value_info(name, kind, [None] * ranks[export.form]) for name in outputs]
-    given = helper.make_tensor_value_info("images", kind, [1, 3, export.height, export.width])
+    given = helper.make_tensor_value_info("images", kind, [export.batch, 3, export.height, export.width])
     built = helper.make_graph(graph.nodes, "yolov5", [given], free, graph.initializers)
     _save(path, built, {"names": str(dict(enumerate(names))), "stride": "32"} if metadata is None else metadata)
     return graph.parameters

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap_landmarks.errors import ModelError, UsageError
+from mcap_landmarks.errors import ModelError
 from mcap_landmarks.vision.onnx_session import open_session
 
 from tests.vision.networks import answering
@@ -34,10 +34,3 @@ def test_one_session_for_one_file(tmp_path: Path) -> None:
     path = answering(tmp_path / "m.onnx", {"output0": rows()}, NAMES)
     assert open_session(path, threads=1) is open_session(path, threads=1)
     assert open_session(path, threads=1) is not open_session(path, threads=2)
-
-
-def test_a_missing_provider_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("onnxruntime.get_available_providers", lambda: ["CPUExecutionProvider"])
-    path = answering(tmp_path / "m.onnx", {"output0": rows()}, NAMES)
-    with pytest.raises(UsageError, match="install onnxruntime-gpu"):
-        open_session(path, "cuda")

@@ -91,10 +91,7 @@ class Channel(Generic[M_co]):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stamped:
-    """A message on its way into a recording.
-
-    `frame_id` is that of what it was made from, where its channel may have a topic for each of several sensors.
-    """
+    """A message on its way into a recording; `frame_id` tells which of several sensors it was made from."""
 
     channel: Channel[Message]
     log_time_ns: int
@@ -241,10 +238,11 @@ class Stage:
     The first channel of `reads` is the primary one: each of its messages makes a bundle, and a log must have it;
     `thinned` lets --image-rate and --every leave out some of them. Channels of `reads` that are `optional`, too, are
     read where they are there, and no other stage is run to make them. A channel of `writes` gets its own topic, or the
-    one that its function in `places` gives. `config` is a dataclass type. `resources` are files that the runner opens,
-    hashes and passes in, `options` may be missing; what a function in `choices` makes of what was given counts.
-    `tolerance` says how far each field of `diff` may be off on another machine; a number is absolute. What packages
-    bring to the registries `extensible` takes part in the results.
+    one that its function in `places` gives. `config` is a dataclass type; `settle` leaves nothing of one to the
+    machine, so that keys tell what ran. `resources` are files that the runner opens, hashes and passes in, `options`
+    may be missing; what a function in `choices` makes of what was given counts. `tolerance` says how far each field of
+    `diff` may be off on another machine; a number is absolute. What packages bring to the registries `extensible` takes
+    part in the results.
     """
 
     name: str
@@ -258,6 +256,7 @@ class Stage:
     resources: tuple[str, ...] = ()
     options: tuple[str, ...] = ()
     choices: Mapping[str, Choose] = field(default_factory=dict)
+    settle: Callable[[Any], Any] | None = None
     tolerance: Mapping[str, float | Tolerance] = field(default_factory=dict)
     extensible: tuple[Registry[object], ...] = ()
 

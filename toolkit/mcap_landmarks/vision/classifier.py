@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.errors import ModelError
 from mcap_landmarks.locations import Location
+from mcap_landmarks.vision.config import ProviderChoice
 from mcap_landmarks.vision.metadata import names_of
-from mcap_landmarks.vision.onnx_session import FLOATS, OnnxSession, Provider, fits, open_session
+from mcap_landmarks.vision.onnx_session import FLOATS, OnnxSession, fits, open_session
 from mcap_landmarks.vision.pixels import Rgb
 
 _USUAL_SIDE_PX = 224
@@ -47,7 +48,7 @@ def open_classifier(
     path: Location,
     fallback_names: tuple[str, ...],
     colours: tuple[tuple[float, float, float], tuple[float, float, float]],
-    provider: Provider,
+    provider: ProviderChoice,
     threads: int,
 ) -> Classifier:
     """A classifier whose names are its metadata's, else `fallback_names` if it has as many classes.

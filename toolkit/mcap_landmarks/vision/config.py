@@ -11,6 +11,9 @@ THESIS_SIZE_PX = 640
 USUAL_CONFIDENCE = 0.25
 """The threshold of YOLOv5's own `detect.py`, and of the thesis (Algorithm 1)."""
 
+Provider = Literal["cpu", "cuda", "tensorrt"]
+"""What can run a network."""
+ProviderChoice = Literal[Provider, "auto"]
 Share = Annotated[float, Field(ge=0, le=1)]
 Colour = tuple[float, float, float]
 
@@ -26,11 +29,12 @@ class DetectConfig:
     above 1 so many parts along the image's longer side, which overlap, are looked at beside the whole, with "auto" as
     many as an image needs that would be shrunk much (`vision.tiles`): small objects are found, for more time. `family`
     is the kind of detector that the model is of, unset: the one whose outputs it has. `anchors` count for models of raw
-    heads whose metadata have none. `provider` runs the network, on the CPU in so many `threads` (0: one per core), each
-    with an image of its own. A second-stage classifier, where one is given, can veto or relabel (`classifier_action`) a
-    box for whose label it has another with a probability of `classifier_confidence`; it sees colours of 0 to 1 less
-    `classifier_mean`, divided by `classifier_std`. The thesis (Algorithm 1) has a square of 640, one tile, a threshold
-    of 0.25, no class filter, and a classifier whose objection is always a veto.
+    heads whose metadata have none. `provider` runs the network, "auto" is CUDA where that starts and else the CPU; on
+    the CPU in so many `threads` (0: one per core), each with an image of its own, on a GPU `batch` images in one call
+    where the model's batch axis is free. A second-stage classifier, where one is given, can veto or relabel
+    (`classifier_action`) a box for whose label it has another with a probability of `classifier_confidence`; it sees
+    colours of 0 to 1 less `classifier_mean`, divided by `classifier_std`. The thesis (Algorithm 1) has a square of 640,
+    one tile, a threshold of 0.25, no class filter, and a classifier whose objection is always a veto.
     """
 
     method: Literal["default", "thesis"] = "default"
@@ -44,8 +48,9 @@ class DetectConfig:
     tiles: Annotated[int, Field(ge=1, le=16)] | Literal["auto"] = 1
     family: str | None = None
     anchors: Literal["yolov5", "yolov7"] = "yolov5"
-    provider: Literal["cpu", "cuda"] = "cpu"
+    provider: ProviderChoice = "cpu"
     threads: Annotated[int, Field(ge=0)] = 0
+    batch: Annotated[int, Field(ge=1, le=256)] = 8
     classifier_action: Literal["veto", "relabel"] = "veto"
     classifier_confidence: Share = 0.5
     classifier_mean: Colour = (0.485, 0.456, 0.406)

@@ -80,7 +80,8 @@ class ModelLayout(ABC):
 
     `input_px` is (height, width), None where free; a free side is chosen in whole `stride_px`. The image is the first
     input; every other one is a constant by name. `colours` says how it is normalised, and `place` puts an image
-    (height, width) into an input (height, width).
+    (height, width) into an input (height, width). `by_image`: of several images, the first axis of every output tells
+    which one.
     """
 
     input_px: ImageSides
@@ -88,6 +89,7 @@ class ModelLayout(ABC):
     constants: Mapping[str, NDArray[Any]] = field(default_factory=dict, kw_only=True)
     colours: Colours = field(default_factory=Colours, kw_only=True)
     place: Callable[[tuple[int, int], tuple[int, int]], Letterbox] = field(default=fit, kw_only=True)
+    by_image: bool = field(default=True, kw_only=True)
 
     @abstractmethod
     def outputs(self, input_px: tuple[int, int]) -> tuple[Shape, ...]:

@@ -1,23 +1,23 @@
-"""ONNX files and how they are run: the only importer of onnxruntime."""
+"""ONNX files and how they are run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import onnxruntime
 from numpy.typing import NDArray
 from onnxruntime.capi import onnxruntime_pybind11_state as state
 
-from mcap_landmarks.errors import ModelError, UsageError
+from mcap_landmarks.errors import ModelError
 from mcap_landmarks.locations import Location, to_read
+from mcap_landmarks.vision.config import Provider, ProviderChoice
+from mcap_landmarks.vision.providers import best_provider, start
 
-Provider = Literal["cpu", "cuda"]
 Shape = tuple[int | None, ...]
 
-_PROVIDERS = {"cpu": "CPUExecutionProvider", "cuda": "CUDAExecutionProvider"}
 _FAILURES = (
     *(state.Fail, state.InvalidArgument, state.NoSuchFile, state.NoModel, state.RuntimeException, state.EPFail),
     *(state.InvalidProtobuf, state.NotImplemented, state.InvalidGraph, RuntimeError, ValueError),
@@ -54,8 +54,8 @@ def fits(found: Sequence[int | None], expected: Shape) -> bool:
 class OnnxSession:
     """A loaded ONNX file; made by `open_session`. It may be run from several threads."""
 
-    def __init__(self, path: Location, session: onnxruntime.InferenceSession) -> None:
-        self.path = path
+    def __init__(self, path: Location, session: onnxruntime.InferenceSession, provider: Provider) -> None:
+        self.path, self.provider = path, provider
         self.inputs = tuple(_tensor(entry) for entry in session.get_inputs())
         self.outputs = tuple(_tensor(entry) for entry in session.get_outputs())
         self.metadata: Mapping[str, str] = session.get_modelmeta().custom_metadata_map
@@ -76,7 +76,7 @@ class OnnxSession:
             ) from error
 
 
-def open_session(path: Location, provider: Provider = "cpu", threads: int = 0) -> OnnxSession:
+def open_session(path: Location, provider: ProviderChoice = "cpu", threads: int = 0) -> OnnxSession:
     """A session of an ONNX file, the same one for the same file and settings; `threads` 0: one per core.
 
     Raises:
@@ -88,14 +88,13 @@ def open_session(path: Location, provider: Provider = "cpu", threads: int = 0) -
         status = local.stat()
     except OSError as error:
         raise ModelError(f"{path}: cannot be read ({error.strerror}); check the path of the model") from error
-    return _open(local, (status.st_mtime_ns, status.st_size), provider, threads)
+    return _open(
+        local, (status.st_mtime_ns, status.st_size), best_provider() if provider == "auto" else provider, threads
+    )
 
 
 @lru_cache(maxsize=2)
 def _open(path: Path, _version: tuple[int, int], provider: Provider, threads: int) -> OnnxSession:
-    name = _PROVIDERS[provider]
-    if name not in onnxruntime.get_available_providers():
-        raise UsageError(f"detect.provider = {provider}: this onnxruntime has no {name}; install onnxruntime-gpu")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
@@ -104,12 +103,10 @@ def _open(path: Path, _version: tuple[int, int], provider: Provider, threads: in
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = _ERRORS_ONLY
     try:
-        session = onnxruntime.InferenceSession(str(path), options, providers=[name])
+        session = start(path, options, provider)
     except _FAILURES as error:
         raise ModelError(f"{path}: not an ONNX model that can be run: {_first_line(error)}") from error
-    if session.get_providers()[0] != name:  # onnxruntime falls back to the CPU when a GPU library is missing
-        raise UsageError(f"detect.provider = {provider}: {name} does not start; check the driver, CUDA and cuDNN")
-    return OnnxSession(path, session)
+    return OnnxSession(path, session, provider)
 
 
 def _tensor(entry: onnxruntime.NodeArg) -> Tensor:

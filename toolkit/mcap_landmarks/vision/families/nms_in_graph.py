@@ -65,7 +65,7 @@ def recognise(signature: Signature) -> SuppressedLayout | str:
         if len(shapes) == 1 and _is_six(signature, shapes[0]):
             return SuppressedLayout(input_px, _STRIDES[-1], "six", ((1, shapes[0][1], 6),))
         if len(shapes) == 1 and fits(shapes[0], (None, 7)) and shapes[0][1] == 7:
-            return SuppressedLayout(input_px, _STRIDES[-1], "seven", shapes)
+            return SuppressedLayout(input_px, _STRIDES[-1], "seven", shapes, by_image=False)
         places = _parts(signature.outputs)
         if places:
             return SuppressedLayout(input_px, _STRIDES[-1], "parts", shapes, places)
