@@ -128,7 +128,7 @@ def test_folders_and_drives_are_compared_as_diff_compares_them(tmp_path: Path) -
     document = ml.diff_folders(tmp_path / "before", tmp_path / "after")
     assert [log["log"] for log in document["logs"]] == ["a"]
     assert not document["fails"]
-    with pytest.raises(ml.UsageError, match="before is a folder; compare folders with diff_folders"):
+    with pytest.raises(ml.UsageError, match="before holds several logs; compare such with diff_folders"):
         ml.diff(tmp_path / "before", tmp_path / "after")
     drives = ml.diff_drives(tmp_path / "before" / "a.mcap", tmp_path / "after" / "a.mcap")
     assert drives.document["verdict"] == "two drives"

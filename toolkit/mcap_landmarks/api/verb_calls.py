@@ -14,10 +14,10 @@ from mcap_landmarks.diff.criteria import read_criteria
 from mcap_landmarks.diff.drives import DriveDiff
 from mcap_landmarks.diff.drives import diff_drives as compare_drives
 from mcap_landmarks.diff.set_document import SetDocument
+from mcap_landmarks.diff.set_logs import is_set
 from mcap_landmarks.diff.sets import diff_sets
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.evaluation.evaluate import Association, evaluate_file, pairing_by
-from mcap_landmarks.locations import to_read
 from mcap_landmarks.recording.reader import reading_from_front
 from mcap_landmarks.runs.build_map import build_map_of
 from mcap_landmarks.runs.config_text import toml_value
@@ -160,8 +160,8 @@ def diff(
     conditions = [parse(text) for text in texts(fail_on)]
     sides, truth = (place(baseline, "baseline"), place(candidate, "candidate")), maybe_place(reference, "reference")
     for side in sides:
-        if to_read(side).is_dir():
-            raise UsageError(f"{side} is a folder; compare folders with diff_folders")
+        if is_set(side):
+            raise UsageError(f"{side} holds several logs; compare such with diff_folders")
     with reading_from_front() if lenient else nullcontext():
         found = compare(*sides, pairs(tolerance, "tolerance"), conditions, reference=truth, aligned=align)
     tell(place(candidate, "candidate"), found.losses)
@@ -176,7 +176,7 @@ def diff_folders(
     fail_on: str | Sequence[str] | None = None,
     reference: AnyPath | None = None,
 ) -> SetDocument:
-    """What changed between two folders of results, a verdict for each metric over all logs: that of `diff --json`.
+    """What changed between two folders or catalogues of results, a verdict for each metric: that of `diff --json`.
 
     Logs are paired by recording, else by name; either folder may hold what was blessed. `criteria` is a TOML file.
 

@@ -1,4 +1,4 @@
-"""Say what changed between two runs: two logs with results, two landmark databases, or two folders of logs."""
+"""Say what changed between two runs: two logs with results, two maps, two folders of logs, or two catalogues."""
 
 from typing import TYPE_CHECKING
 
@@ -35,16 +35,19 @@ def command(
     Messages are paired by channel and time stamp, detections by overlap and class, objects and landmarks by position
     and class. What the manifests say was meant to differ does not count as a difference.
 
-    Of two folders, logs are paired by what was recorded, then by name, and every metric gets a verdict over all pairs:
-    same, better, worse, or inconclusive. Exit code 0: nothing that gates got worse, 1: it did, 2: an error, also where
-    a log could not be compared. Two drives are compared by rates, distributions, classes, landmarks and errors.
+    Of two folders, or catalogues of a batch, logs are paired by what was recorded, then by name, and every metric gets
+    a verdict over all pairs: same, better, worse, or inconclusive. Exit code 0: nothing that gates got worse, 1: it
+    did, 2: an error, also where a log could not be compared. Two drives are compared by rates, distributions, classes,
+    landmarks and errors.
     """
     for place in filter(None, (baseline, candidate, reference)):
         to_read(place)
     sets.check_places()
     before, after = _sides(baseline, candidate, sets)
     try:
-        if to_read(before).is_dir() or to_read(after).is_dir() or sets.blessed is not None:
+        from mcap_landmarks.diff.set_logs import is_set
+
+        if is_set(before) or is_set(after) or sets.blessed is not None:
             if any((tolerance, align, drives is not None)):
                 raise UsageError("--tolerance, --align and --drives are of two files; folders have --criteria")
             code = diff_folders(before, after, sets, fail_on or [], reference, json=json)

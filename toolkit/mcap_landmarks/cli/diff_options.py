@@ -11,7 +11,11 @@ from mcap_landmarks.locations import Location, location, to_read, to_write
 
 Baseline = Annotated[
     Location,
-    typer.Argument(metavar="BASELINE", parser=location, help="A log with results, a MAP.db, or a folder of logs."),
+    typer.Argument(
+        metavar="BASELINE",
+        parser=location,
+        help="A log with results, a MAP.db, a folder of logs, or a catalogue of a batch.",
+    ),
 ]
 Candidate = Annotated[
     Location | None,

@@ -1,4 +1,4 @@
-"""How `diff` compares two folders of logs and tells what it found."""
+"""How `diff` compares two sets of logs, folders or catalogues, and tells what it found."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -20,11 +20,11 @@ _WORST = 10
 def _bless(candidate: Location, folder: Location, reference: Location | None, *, json: bool) -> int:
     """Keep the figures of all logs of a folder; the exit code."""
     from mcap_landmarks.diff.blessed import bless as keep
-    from mcap_landmarks.diff.set_logs import blessed_logs
+    from mcap_landmarks.diff.set_logs import blessed_logs, set_size
 
     if to_write(folder).resolve() == to_read(candidate).resolve():
         raise UsageError(f"--baseline {folder}: holds the results themselves; name another folder for what is blessed")
-    with progress("read", _size_of(candidate)) as advance:
+    with progress("read", set_size(candidate)) as advance:
         logs = blessed_logs(candidate, reference, advance)
     path = keep(to_write(folder), logs)
     if json:
@@ -50,6 +50,7 @@ def diff_folders(
     """
     from mcap_landmarks.diff.conditions import parse
     from mcap_landmarks.diff.criteria import read_criteria
+    from mcap_landmarks.diff.set_logs import is_set, set_size
     from mcap_landmarks.diff.sets import diff_sets
     from mcap_landmarks.runs.replacing import new_files
 
@@ -59,12 +60,12 @@ def diff_folders(
         return _bless(candidate, baseline, reference, json=json)
     conditions = [parse(text) for text in fail_on]
     for place in (baseline, candidate):
-        if not to_read(place).is_dir():
-            raise UsageError(f"{place}: is no folder; compare two folders of logs, or two files")
+        if not is_set(place):
+            raise UsageError(f"{place}: is no folder and no catalogue; compare two sets of logs, or two files")
     criteria = None if given.criteria is None else read_criteria(given.criteria)
     outputs, inputs = (given.junit, given.markdown), (baseline, candidate, given.criteria, reference)
     with new_files(outputs, inputs, overwrite=given.overwrite):
-        with progress("compare", _size_of(baseline) + _size_of(candidate)) as advance:
+        with progress("compare", set_size(baseline) + set_size(candidate)) as advance:
             document = diff_sets(baseline, candidate, criteria, conditions, reference=reference, progress=advance)
         _write(given, document)
     if json:
@@ -78,8 +79,10 @@ def diff_folders(
 
 
 def _warn(folders: "Sequence[Location]", document: "SetDocument") -> None:
+    from mcap_landmarks.diff.set_logs import maps_in
+
     for folder in folders:
-        maps = sorted(path.name for path in to_read(folder).rglob("*.db"))
+        maps = maps_in(folder)
         if maps:
             warn(f"note: {folder}: maps are compared one by one, and {short(', '.join(maps))} not at all here")
     for broken in document["broken"]:
@@ -97,10 +100,6 @@ def _write(given: SetOptions, document: "SetDocument") -> None:
     if given.markdown is not None:
         with atomic_file(given.markdown) as stream:
             stream.write(markdown(document).encode())
-
-
-def _size_of(folder: Location) -> int:
-    return sum(path.stat().st_size for path in to_read(folder).rglob("*.mcap") if path.is_file())
 
 
 def _print(document: "SetDocument") -> None:

@@ -18,7 +18,9 @@ def command(
     results: Annotated[
         list[Location],
         typer.Argument(
-            metavar="RESULT...", parser=location, help="Logs with results, a MAP.db, or results.txt as in Appendix D."
+            metavar="RESULT...",
+            parser=location,
+            help="Logs with results, a MAP.db, results.txt as in Appendix D, or a catalogue of a batch.",
         ),
     ],
     output: Annotated[
@@ -46,20 +48,23 @@ def command(
 ) -> None:
     """Write one HTML file about RESULT that opens offline: map, errors, every bundle with its image and decision.
 
-    Several results become a table to sort, the worst first; two with --diff one page of what changed.
+    Several results become a table to sort, the worst first; two with --diff one page of what changed. A catalogue
+    stands for what the last run of each of its logs wrote.
     """
+    from mcap_landmarks.report.page.given_results import given_results
     from mcap_landmarks.report.page.written_report import check_report, written_report
     from mcap_landmarks.runs.replacing import earlier_picture, output_to
 
-    check_report(results, output, is_diff=diff, printed=printed)
-    read = [*results, *(file for file in (reference, printed) if file is not None)]
+    given = given_results(results, is_diff=diff)
+    check_report(given, output, is_diff=diff, printed=printed)
+    read = [*results, *given.files, *(file for file in (reference, printed) if file is not None)]
     with (
-        output_to(output, read, earlier_picture("report", results), overwrite=overwrite),
-        progress("read", sum(map(size_of, results)) or None) as advance,
+        output_to(output, read, earlier_picture("report", given.files), overwrite=overwrite),
+        progress("read", sum(map(size_of, given.files)) or None) as advance,
     ):
-        made = written_report(
-            results, output, reference, printed=printed, is_diff=diff, aligned=align, progress=advance
-        )
+        made = written_report(given, output, reference, printed=printed, is_diff=diff, aligned=align, progress=advance)
+    for note in given.notes:
+        warn(f"note: {note}")
     _tell(made, output, as_json=json)
     if made.losses:
         raise typer.Exit(PARTIAL)

@@ -1,16 +1,17 @@
-"""The logs of a set of runs: what a folder holds, what was blessed of one, and the truth that others have for them."""
+"""The logs of a set of runs: of a folder or a catalogue, what was blessed, and the truth that others have for them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
+from mcap_landmarks.catalogue.catalogue_file import is_catalogue
+from mcap_landmarks.catalogue.last_runs import last_runs
 from mcap_landmarks.diff.blessed import BLESSED, BlessedLog, read_blessed
 from mcap_landmarks.diff.log_figures import ReadLog, log_figures, read_log
 from mcap_landmarks.diff.paired_logs import pair_logs
 from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
 from mcap_landmarks.evaluation.metrics import Reference
 from mcap_landmarks.evaluation.read import read_reference
-from mcap_landmarks.locations import Location, to_read
+from mcap_landmarks.locations import Location, size_of, to_read
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import open_recording
 
@@ -22,18 +23,32 @@ class SetLog:
     """A log of a set: a file, or what was blessed of one; `error` says why it cannot be read."""
 
     name: str
-    path: Path | None = None
+    path: Location | None = None
     fingerprint: str | None = None
     blessed: BlessedLog | None = None
     error: str | None = None
 
 
+def is_set(place: Location) -> bool:
+    """Whether a place holds a set of logs: a folder, or a catalogue of what a batch wrote."""
+    return is_catalogue(place) or to_read(place).is_dir()
+
+
 def logs_in(folder: Location) -> list[SetLog]:
     """The logs of a folder by name, those in its folders too; where it has blessed results, these.
+
+    Of a catalogue, the logs that the last run of each wrote; those that are gone have an error.
 
     Raises:
         ToolkitError: there are none, or the blessed ones cannot be read.
     """
+    if is_catalogue(folder):
+        runs = [run for run in last_runs(folder) if run.output is None or run.output.suffix == _SUFFIX]
+        if not runs:
+            raise UsageError(f"{folder}: has no runs that wrote logs (*{_SUFFIX}); maps are compared one by one")
+        return [
+            SetLog(run.name, error=run.error) if run.output is None else _listed(run.output, run.name) for run in runs
+        ]
     place = to_read(folder)
     if (place / BLESSED).exists():
         return [SetLog(log.name, fingerprint=log.fingerprint, blessed=log) for log in read_blessed(place / BLESSED)]
@@ -43,7 +58,22 @@ def logs_in(folder: Location) -> list[SetLog]:
     return [_listed(path, path.relative_to(place).with_suffix("").as_posix()) for path in paths]
 
 
-def _listed(path: Path, name: str) -> SetLog:
+def maps_in(place: Location) -> list[str]:
+    """The names of the landmark databases in a folder or a catalogue, which no set is compared by."""
+    if is_catalogue(place):
+        found = [run.output.name for run in last_runs(place) if run.output is not None and run.output.suffix == ".db"]
+        return sorted(found)
+    return sorted(path.name for path in to_read(place).rglob("*.db"))
+
+
+def set_size(place: Location) -> int:
+    """Bytes of all logs of a set."""
+    if is_catalogue(place):
+        return sum(size_of(run.output) for run in last_runs(place) if run.output is not None)
+    return sum(size_of(path) for path in to_read(place).rglob(f"*{_SUFFIX}"))
+
+
+def _listed(path: Location, name: str) -> SetLog:
     try:
         with open_recording(path) as recording:
             return SetLog(name, path, recording.fingerprint())
@@ -73,7 +103,7 @@ class Truths:
     def __init__(self, reference: Location | None) -> None:
         self._known: Reference | None = Reference()
         self._logs: list[SetLog] = []
-        if reference is not None and to_read(reference).is_dir():
+        if reference is not None and is_set(reference):
             self._logs = logs_in(reference)
         elif reference is not None:
             self._known, losses = read_reference(reference)
@@ -94,7 +124,7 @@ class Truths:
 
 
 def blessed_logs(folder: Location, reference: Location | None, progress: Progress | None = None) -> list[BlessedLog]:
-    """What can be blessed of a folder of results: all of it.
+    """What can be blessed of a set of results: all of it.
 
     Raises:
         ToolkitError: a log cannot be read whole, or has no results.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mcap_landmarks.atomic import check_target, held
-from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
 from mcap_landmarks.locations import Location, to_read, to_write
 from mcap_landmarks.manifest import CONTENT, RUN, entry_text, file_hash
 from mcap_landmarks.maps.database import read_manifest
@@ -123,11 +123,7 @@ def earlier_map(verb: str, inputs: Sequence[str]) -> IsEarlier:
 
 
 def picture_mark(verb: str, inputs: Iterable[Location]) -> str:
-    """What a picture carries to be known again: the verb and a hash over what it shows.
-
-    Raises:
-        ToolkitError: an input cannot be read.
-    """
+    """What a picture carries to be known again: the verb and a hash over what it shows."""
     digest = hashlib.sha256("".join(map(_identity, inputs)).encode())
     return f"mcap-landmarks {verb} of {digest.hexdigest()}"
 
@@ -176,12 +172,17 @@ def _in_any_order(text: str | None) -> object:
 
 
 def _identity(place: Location) -> str:
-    """The fingerprint of a recording, so that its results do not change it; a hash of any other file."""
+    """The fingerprint of a recording, so that its results do not change it; a hash of any other file.
+
+    What cannot be read has none, which is told by who reads it.
+    """
     try:
         with open_recording(place) as recording:
             return recording.fingerprint()
     except RecordingError:
-        return file_hash(place)
+        with contextlib.suppress(ToolkitError):
+            return file_hash(place)
+    return ""
 
 
 def _is_same(path: Path, source: Path) -> bool:

@@ -8,7 +8,7 @@ from functools import partial
 from mcap_landmarks.atomic import atomic_file, check_target
 from mcap_landmarks.diff.comparison import diff
 from mcap_landmarks.diff.two_drives import are_two_drives
-from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
 from mcap_landmarks.evaluation.metrics import Reference
 from mcap_landmarks.evaluation.read import read_reference
 from mcap_landmarks.locations import Location
@@ -16,6 +16,7 @@ from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.report.page.diff_page import diff_page
 from mcap_landmarks.report.page.fleet_page import UnreadResult, fleet_page
+from mcap_landmarks.report.page.given_results import GivenResults
 from mcap_landmarks.report.page.paged_result import PagedResult, read_result
 from mcap_landmarks.report.page.result_page import MadePage, result_page
 from mcap_landmarks.report.page.stage_seconds import stage_seconds
@@ -46,9 +47,7 @@ class WrittenReport:
         }
 
 
-def check_report(
-    results: Sequence[Location], output: Location, *, is_diff: bool, printed: Location | None = None
-) -> None:
+def check_report(results: GivenResults, output: Location, *, is_diff: bool, printed: Location | None = None) -> None:
     """Refuse what cannot become a page.
 
     Raises:
@@ -58,14 +57,14 @@ def check_report(
     check_target(output)
     if output.suffix.lower() not in _ENDINGS:
         raise UsageError(f"{output}: a report is a page; use a name that ends with .html")
-    if is_diff and len(results) != 2:
-        raise UsageError(f"--diff is of two results, BASELINE and CANDIDATE, not of {len(results)}; name both")
-    if printed is not None and len(results) != 1:
-        raise UsageError(f"--run is of one result, not of {len(results)}; leave it out")
+    if is_diff and len(results.files) != 2:
+        raise UsageError(f"--diff is of two results, BASELINE and CANDIDATE, not of {len(results.files)}; name both")
+    if printed is not None and (results.is_many or is_diff):
+        raise UsageError("--run is of one result, not of several; leave it out")
 
 
 def written_report(
-    results: Sequence[Location],
+    given: GivenResults,
     output: Location,
     reference: Location | None = None,
     *,
@@ -83,11 +82,12 @@ def written_report(
     """
     truth, lost = read_reference(reference) if reference is not None else (Reference(), [])
     losses = [f"{reference}: {loss}" for loss in lost]
+    results = given.files
     mark, names = picture_mark("report", results), names_of(results)
     read = partial(read_result, reference=truth, aligned=aligned, progress=progress)
-    kind = "diff" if is_diff else "page" if len(results) == 1 else "table"
+    kind = "diff" if is_diff else "table" if given.is_many else "page"
     if kind == "table":
-        found, unread = _readable(results, names, partial(read, is_brief=True))
+        found, unread = _readable(given, names, partial(read, is_brief=True))
         page = fleet_page(found, unread, mark)
         names = tuple(one.name for one in found)
         losses += [f"{one.name} could not be read: {one.reason}" for one in unread]
@@ -126,19 +126,24 @@ def _diff(
 
 
 def _readable(
-    results: Sequence[Location], names: Sequence[str], read: Callable[[Location, str], PagedResult]
+    given: GivenResults, names: Sequence[str], read: Callable[[Location, str], PagedResult]
 ) -> tuple[list[PagedResult], list[UnreadResult]]:
     """The results that can be read, and the others.
 
     Raises:
+        UsageError: there is none that can, since what was asked for makes no sense.
         RecordingError: there is none that can.
     """
-    found, unread = list[PagedResult](), list[UnreadResult]()
-    for path, name in zip(results, names, strict=True):
+    found, unread = list[PagedResult](), list(given.missing)
+    wrong = list[UsageError]()
+    for path, name in zip(given.files, names, strict=True):
         try:
             found.append(read(path, name))
-        except RecordingError as error:
+        except ToolkitError as error:
             unread.append(UnreadResult(name, str(error)))
+            wrong += [error] if isinstance(error, UsageError) else []
+    if not found and len(wrong) == len(unread):
+        raise wrong[0]
     if not found:
         raise RecordingError(f"none of {len(unread)} results can be read, the first because: {unread[0].reason}")
     return found, unread

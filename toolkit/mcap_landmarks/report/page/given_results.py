@@ -1,0 +1,59 @@
+"""The results that a report is asked for: files, and the outputs of a catalogue, each once."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcap_landmarks.catalogue.catalogue_file import is_catalogue
+from mcap_landmarks.catalogue.last_runs import last_runs
+from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location
+from mcap_landmarks.report.page.fleet_page import UnreadResult
+
+
+@dataclass(frozen=True, slots=True)
+class GivenResults:
+    """The files of a report; the outputs of catalogues that are not there; notes on files that were named twice.
+
+    `is_many` says whether it is of many results, even where only one of them is left.
+    """
+
+    files: tuple[Location, ...]
+    missing: tuple[UnreadResult, ...] = ()
+    notes: tuple[str, ...] = ()
+    is_many: bool = False
+
+
+def given_results(places: Sequence[Location], *, is_diff: bool) -> GivenResults:
+    """The results behind what a user named; of two that are compared, both as they are.
+
+    Raises:
+        UsageError: --diff is of catalogues.
+        RecordingError: a catalogue cannot be read, or has no results.
+    """
+    catalogues = [place for place in places if is_catalogue(place)]
+    if is_diff:
+        if catalogues:
+            raise UsageError(f"--diff is of two results, and {catalogues[0]} is of many; see mcap-landmarks diff")
+        return GivenResults(tuple(places))
+    runs = {place: last_runs(place) for place in catalogues}
+    missing = [UnreadResult(run.name, run.error) for found in runs.values() for run in found if run.error is not None]
+    files = [
+        file
+        for place in places
+        for file in ([run.output for run in runs[place] if run.output is not None] if place in runs else [place])
+    ]
+    once, notes = _each_once(files)
+    return GivenResults(tuple(once), tuple(missing), tuple(notes), len(places) > 1 or bool(catalogues))
+
+
+def _each_once(files: Iterable[Location]) -> tuple[list[Location], list[str]]:
+    """Each file as it was named first, and notes on the others."""
+    known: dict[str, Location] = {}
+    notes = []
+    for file in files:
+        key = str(file.resolve()) if isinstance(file, Path) else str(file)
+        if key in known:
+            notes.append(f"{file} was named twice and counts once")
+        known.setdefault(key, file)
+    return list(known.values()), list(dict.fromkeys(notes))
