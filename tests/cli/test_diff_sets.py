@@ -8,6 +8,7 @@ from xml.etree import ElementTree as ET
 
 import jsonschema
 import pytest
+from mcap_landmarks.catalogue.catalogue_file import append_rows
 from mcap_landmarks.channels import TRUTH_POSE
 from mcap_landmarks.cli.console import DONE, USAGE, run_command
 from mcap_landmarks.cli.diff_text import DIFFERENT
@@ -17,9 +18,11 @@ from mcap_landmarks.messages.poses import PoseStamped
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.stage import Stamped
 
+from tests.catalogue.rows import row
 from tests.cli.calls import schema_of
 from tests.diff.sets import folder, result
 
+MAP_DB = Path(__file__).parents[1] / "golden" / "map.db"
 ERRORS_M = {f"drive_{i}": 0.03 + 0.01 * i for i in range(8)}
 
 
@@ -264,3 +267,22 @@ def test_no_results_is_told(sets: Path) -> None:
     found = diff_sets(sets / "before", sets / "after")
     assert found["pairs"] == 7
     assert "has no results" in found["broken"][0]["error"]
+
+
+@pytest.mark.slow
+def test_catalogues_stand_for_the_folders_of_their_outputs(
+    made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for side in ("before", "after"):
+        rows = [row(f"{name}.mcap", str(made / side / f"{name}.mcap")) for name in ERRORS_M]
+        append_rows(tmp_path / f"{side}.db", [*rows, row("a.mcap", "a.json", verb="evaluate")])
+    folders = document(capsys, made / "before", made / "after")
+    assert document(capsys, tmp_path / "before.db", tmp_path / "after.db") == folders
+    assert document(capsys, made / "before", tmp_path / "after.db") == folders
+    append_rows(tmp_path / "after.db", [row("drive_1.mcap", "gone.mcap", 1), row("drive_2.mcap", None, 1)])
+    assert run(tmp_path / "before.db", tmp_path / "after.db") == USAGE
+    err = capsys.readouterr().err
+    assert f"error: {tmp_path}/gone.mcap: is gone, which the last run of drive_1.mcap wrote" in err
+    assert "error: drive_2.mcap: its last run left no output: failed" in err
+    assert run(tmp_path / "before.db", MAP_DB) == USAGE
+    assert "is no folder and no catalogue" in capsys.readouterr().err

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from mcap_landmarks.catalogue.catalogue_file import append_rows
 from mcap_landmarks.channels import TRUTH_POSE
 
+from tests.catalogue.rows import row
 from tests.cli.calls import call, refused, schema_of
 from tests.diff.recordings import localized_log, localized_messages, write
 
@@ -85,3 +87,42 @@ def test_two_runs_that_were_moved_onto_the_truth_have_the_figures_behind_that(tm
     for align, words in (((), 0), (("--align",), 1)):
         assert call("report", *logs, "--diff", *align, "-o", tmp_path / f"{words}.html") == 0
         assert ("alignment.x_m" in (tmp_path / f"{words}.html").read_text()) is bool(words)
+
+
+@pytest.mark.slow
+def test_what_is_missing_among_many_is_named_and_what_is_named_twice_counts_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, page = localized_log(tmp_path / "r.mcap"), tmp_path / "fleet.html"
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "link.mcap").symlink_to(log)
+    many = (log, tmp_path / "none.mcap", tmp_path / "none.db", tmp_path / "folder", log, tmp_path / "link.mcap")
+    assert call("report", *many, "-o", page, "--json") == 3
+    printed = capsys.readouterr()
+    document = json.loads(printed.out)
+    assert [one["name"] for one in document["results"]] == ["r.mcap"]
+    assert [loss.split(" could not")[0] for loss in document["losses"]] == ["none.mcap", "none.db", "folder"]
+    assert f"note: {log} was named twice and counts once" in printed.err
+    text = page.read_text()
+    assert all(f"{name} could not be read" in text for name in ("none.mcap", "none.db", "folder"))
+    assert call("report", *many, "-o", page) == 3  # of the same, so that it may be replaced
+    assert call("report", log, log, "-o", tmp_path / "twice.html") == 0
+    assert "1 results" not in (tmp_path / "twice.html").read_text()
+    missing = (tmp_path / "none.mcap", tmp_path / "folder")
+    assert "none of 2 results can be read" in refused(capsys, 1, "report", *missing, "-o", tmp_path / "no.html")
+
+
+@pytest.mark.slow
+def test_a_catalogue_stands_for_the_last_output_of_each_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    catalogue, page = tmp_path / "runs.parquet", tmp_path / "fleet.html"
+    (tmp_path / "out").mkdir()
+    localized_log(tmp_path / "out" / "a.mcap")
+    outputs = {"a.mcap": "out/a.mcap", "b.mcap": "out/b.mcap", "c.mcap": None}
+    append_rows(catalogue, [row("a.mcap", "old.mcap"), *(row(log, output, 1) for log, output in outputs.items())])
+    assert call("report", catalogue, "-o", page) == 3
+    printed = capsys.readouterr()
+    assert "table of a.mcap" in printed.out
+    assert f"b could not be read: {tmp_path}/out/b.mcap: is gone" in printed.err
+    assert "c could not be read: c.mcap: its last run left no output: failed" in page.read_text()
+    assert "is of many" in refused(capsys, 2, "report", catalogue, catalogue, "--diff", "-o", page)
+    assert "leave it out" in refused(capsys, 2, "report", catalogue, "--run", page, "-o", tmp_path / "x.html")

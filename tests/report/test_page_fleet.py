@@ -41,7 +41,7 @@ def test_a_log_that_cannot_be_read_is_told_and_the_others_shown(
     assert call("report", log, tmp_path / "broken.mcap", "-o", page) == 3
     assert "broken.mcap could not be read" in capsys.readouterr().err
     assert "broken.mcap could not be read" in page.read_text()
-    assert call("report", tmp_path / "broken.mcap", tmp_path / "broken.mcap", "-o", tmp_path / "none.html") == 1
+    assert call("report", tmp_path / "broken.mcap", tmp_path / "gone.mcap", "-o", tmp_path / "none.html") == 1
     assert "none of 2 results can be read" in capsys.readouterr().err
 
 

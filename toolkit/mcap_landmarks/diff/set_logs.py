@@ -43,12 +43,7 @@ def logs_in(folder: Location) -> list[SetLog]:
         ToolkitError: there are none, or the blessed ones cannot be read.
     """
     if is_catalogue(folder):
-        runs = [run for run in last_runs(folder) if run.output is None or run.output.suffix == _SUFFIX]
-        if not runs:
-            raise UsageError(f"{folder}: has no runs that wrote logs (*{_SUFFIX}); maps are compared one by one")
-        return [
-            SetLog(run.name, error=run.error) if run.output is None else _listed(run.output, run.name) for run in runs
-        ]
+        return _catalogued(folder)
     place = to_read(folder)
     if (place / BLESSED).exists():
         return [SetLog(log.name, fingerprint=log.fingerprint, blessed=log) for log in read_blessed(place / BLESSED)]
@@ -56,6 +51,14 @@ def logs_in(folder: Location) -> list[SetLog]:
     if not paths:
         raise UsageError(f"{folder}: holds neither logs (*{_SUFFIX}) nor {BLESSED}; name a folder of results")
     return [_listed(path, path.relative_to(place).with_suffix("").as_posix()) for path in paths]
+
+
+def _catalogued(place: Location) -> list[SetLog]:
+    """The logs that the last run of each log in a catalogue wrote."""
+    runs = [run for run in last_runs(place) if run.output is None or run.output.suffix == _SUFFIX]
+    if not runs:
+        raise UsageError(f"{place}: has no runs that wrote logs (*{_SUFFIX}); maps are compared one by one")
+    return [SetLog(run.name, error=run.error) if run.output is None else _listed(run.output, run.name) for run in runs]
 
 
 def maps_in(place: Location) -> list[str]:

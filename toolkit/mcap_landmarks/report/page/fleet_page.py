@@ -39,7 +39,7 @@ def fleet_page(results: Sequence[PagedResult], unread: Sequence[UnreadResult], m
     """The page of many results; those that could not be read stand above the table."""
     ordered = sorted(results, key=_badness)
     values = {
-        "title": f"{len(results) + len(unread)} results",
+        "title": counted(len(results) + len(unread), "result"),
         "verdict": _verdict(ordered),
         "tiles": _tiles(ordered),
         "missing": [

@@ -36,13 +36,14 @@ def given_results(places: Sequence[Location], *, is_diff: bool) -> GivenResults:
         if catalogues:
             raise UsageError(f"--diff is of two results, and {catalogues[0]} is of many; see mcap-landmarks diff")
         return GivenResults(tuple(places))
-    runs = {place: last_runs(place) for place in catalogues}
-    missing = [UnreadResult(run.name, run.error) for found in runs.values() for run in found if run.error is not None]
-    files = [
-        file
-        for place in places
-        for file in ([run.output for run in runs[place] if run.output is not None] if place in runs else [place])
-    ]
+    files, missing = list[Location](), list[UnreadResult]()
+    for place in places:
+        if place not in catalogues:
+            files.append(place)
+            continue
+        runs = last_runs(place)
+        files += [run.output for run in runs if run.output is not None]
+        missing += [UnreadResult(run.name, run.error) for run in runs if run.error is not None]
     once, notes = _each_once(files)
     return GivenResults(tuple(once), tuple(missing), tuple(notes), len(places) > 1 or bool(catalogues))
 
