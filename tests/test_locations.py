@@ -1,22 +1,25 @@
-"""What a user names: paths stay paths, URLs stay as they were written and are refused where they would be opened."""
+"""What a user names: paths stay paths, URLs stay as they were written but for their secrets."""
 
+import pickle
 from pathlib import Path
 
 import pytest
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.locations import Url, location, size_of, to_read, to_write
+from mcap_landmarks.locations import Url, is_folder, location, matching, size_of, to_read, to_write
 
 URLS = ("https://host.example/logs/run.1.mcap?signature=a/b.c", "s3://bucket/run.1.mcap", "gs://b/a//run.1.mcap#x")
 
 
 @pytest.mark.parametrize("text", URLS)
-def test_a_url_is_shown_as_it_was_written(text: str) -> None:
+def test_a_url_is_shown_without_what_may_be_secret(text: str) -> None:
     url = location(text)
-    assert str(url) == text
+    assert str(url) == text.replace("signature=a/b.c", "...")
+    assert repr(url) == f"Url({str(url)!r})"
     assert (url.name, url.stem, url.suffix) == ("run.1.mcap", "run.1", ".mcap")
     assert url == Url(text)
     assert len({url, location(text)}) == 1
+    assert pickle.loads(pickle.dumps(url)).text == text  # noqa: S301 # tasks hold locations
 
 
 @pytest.mark.parametrize(
@@ -27,16 +30,23 @@ def test_everything_else_is_a_path(text: str) -> None:
     assert location(Path(text)) == Path(text)
 
 
+def test_a_file_url_is_a_path() -> None:
+    assert location("file:///a%20b/log.mcap") == location("FILE://localhost/a%20b/log.mcap") == Path("/a b/log.mcap")
+    with pytest.raises(UsageError, match=r"file://host/a is a file of another host; "):
+        location("file://host/a")
+
+
 @pytest.mark.parametrize("text", URLS)
-def test_what_would_be_opened_there_says_what_to_do(text: str) -> None:
-    url = location(text)
-    for reading in (lambda: to_read(url), lambda: url.open("rb"), lambda: size_of(url)):
-        with pytest.raises(UsageError) as error:
-            reading()
-        assert str(error.value) == f"{text}: URLs cannot be read yet; download it first"
-    with pytest.raises(UsageError) as error, atomic_file(url):
+def test_nothing_is_written_there_yet(text: str) -> None:
+    with pytest.raises(UsageError) as error, atomic_file(url := location(text)):
         pass
-    assert str(error.value) == f"{text}: URLs cannot be written yet; write to a file and upload that"
+    assert str(error.value) == f"{url}: URLs cannot be written yet; write to a file and upload that"
+
+
+def test_a_scheme_that_nobody_reads_says_which_are() -> None:
+    for reading in (lambda url: url.open("rb"), to_read, size_of, matching, is_folder):
+        with pytest.raises(UsageError, match=r"^ftp://host/a: URLs of this scheme cannot be read .*s3://"):
+            reading(location("ftp://host/a"))
 
 
 def test_paths_pass_and_have_sizes(tmp_path: Path) -> None:

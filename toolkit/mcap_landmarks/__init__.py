@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         MessageError,
         ModelError,
         RecordingError,
+        RemoteError,
         ToolkitError,
         UsageError,
     )
@@ -56,6 +57,7 @@ __all__ = [
     "ModelError",
     "Options",
     "RecordingError",
+    "RemoteError",
     "StructuredArray",
     "ToolkitError",
     "UsageError",

@@ -33,5 +33,9 @@ class ExtensionError(ToolkitError):
     """An installed package that brings a stage, a detector family or a source of its own cannot be used."""
 
 
+class RemoteError(ToolkitError):
+    """A file elsewhere, named by a URL, is missing, may not be used, or cannot be reached."""
+
+
 class LossWarning(UserWarning):
     """Something of a log could not be read, and is missing in what was made of it; of the Python API alone."""

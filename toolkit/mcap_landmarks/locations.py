@@ -1,18 +1,19 @@
 """Where a file is: a path of this machine or a URL. What a user names is a `Location` until it is opened."""
 
-import re
-from dataclasses import dataclass
+import glob
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, Literal, Protocol
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 
 from mcap_landmarks.errors import UsageError
-
-_URL = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+://")  # RFC 3986, section 3.1; a single letter is a drive
+from mcap_landmarks.remote.addresses import URL, scheme_of, shown
 
 
 class Location(Protocol):
-    """A file or folder that a user named: a `Path` is one, and so is a `Url`. `str` shows it as it was written."""
+    """A file or folder that a user named: a `Path` is one, and so is a `Url`. `str` shows it as it was written,
+    without credentials.
+    """
 
     @property
     def name(self) -> str:
@@ -37,12 +38,15 @@ class Location(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Url:
-    """A file elsewhere; nothing can be read there yet."""
+    """A file elsewhere. `text` may hold credentials: it is for who opens it; `str` and `repr` show none."""
 
-    text: str
+    text: str = field(repr=False)
 
     def __str__(self) -> str:
-        return self.text
+        return shown(self.text)
+
+    def __repr__(self) -> str:
+        return f"Url({shown(self.text)!r})"
 
     @property
     def _path(self) -> PurePosixPath:
@@ -63,24 +67,51 @@ class Url:
         """See `Location`."""
         return self._path.suffix
 
-    def open(self, mode: Literal["rb"], /) -> BinaryIO:
-        """See `Location`."""
-        return to_read(self).open(mode)
+    def open(self, mode: Literal["rb"], /) -> BinaryIO:  # noqa: ARG002 # the one that `Location` has
+        """See `Location`; only what is read is fetched.
+
+        Raises:
+            RemoteError: there is no such file, or it cannot be read.
+            UsageError: the scheme is unknown, or the library for it not installed.
+        """
+        from mcap_landmarks.remote.local_copies import open_url  # noqa: PLC0415 # not loaded for paths
+
+        return open_url(self.text)
 
 
 def location(text: str | Path) -> Location:
-    """What a user named: a URL if it has a scheme and `://`, else a path. A default is a path already."""
-    return Url(text) if isinstance(text, str) and _URL.match(text) else Path(text)
+    """What a user named: a URL if it has a scheme and `://`, else a path. A default is a path already.
+
+    What `file://` names is a path, too (RFC 8089).
+
+    Raises:
+        UsageError: a file of another host.
+    """
+    if not isinstance(text, str) or not URL.match(text):
+        return Path(text)
+    if scheme_of(text) != "file":
+        return Url(text)
+    parts = urlsplit(text)
+    if parts.netloc not in {"", "localhost"}:
+        raise UsageError(f"{shown(text)} is a file of another host; write file:///PATH, or the URL of a server")
+    return Path(unquote(parts.path))
 
 
 def to_read(place: Location) -> Path:
     """The path of a file or folder, for what reads paths only; one that does not exist is refused by who opens it.
 
+    Of a file elsewhere that is a copy, made once; see `remote.local_copies`.
+
     Raises:
-        UsageError: it is not on this machine, or it is a pipe or device, which could not be read twice.
+        UsageError: it is a pipe or device, which could not be read twice; or see `Url.open`.
+        RemoteError: it cannot be copied.
     """
+    if isinstance(place, Url):
+        from mcap_landmarks.remote.local_copies import local_copy  # noqa: PLC0415 # not loaded for paths
+
+        return local_copy(place.text)
     if not isinstance(place, Path):
-        raise UsageError(f"{place}: URLs cannot be read yet; download it first")
+        raise TypeError(f"{place!r} is no location")
     if place.exists() and not (place.is_file() or place.is_dir()):
         raise UsageError(f"{place} is neither a file nor a folder; save what it gives to a file first")
     return place
@@ -98,10 +129,46 @@ def to_write(place: Location) -> Path:
 
 
 def size_of(place: Location) -> int:
-    """Bytes of a file; 0 where there is none, since opening it says what is wrong.
+    """Bytes of a file; 0 where there is none on this machine, since opening it says what is wrong.
 
     Raises:
-        UsageError: it is not on this machine.
+        UsageError, RemoteError: see `Url.open`.
     """
+    if isinstance(place, Url):
+        from mcap_landmarks.remote.local_copies import size_of_url  # noqa: PLC0415 # not loaded for paths
+
+        return size_of_url(place.text)
     path = to_read(place)
     return path.stat().st_size if path.is_file() else 0
+
+
+def matching(place: Location) -> list[Location]:
+    """What a pattern (`**` is any depth) or a URL's prefix names, sorted by name; what is there is named by itself.
+
+    Raises:
+        UsageError: a pattern that no path fits; or see `Url.open`.
+        RemoteError: there is no such file elsewhere, nor any below it.
+    """
+    if isinstance(place, Url):
+        from mcap_landmarks.remote.store_listing import urls_matching  # noqa: PLC0415 # not loaded for paths
+
+        return [Url(text) for text in urls_matching(place.text)]
+    path = to_read(place)
+    # Path.glob takes no absolute pattern.
+    found = [str(path)] if path.exists() else sorted(glob.glob(str(path), recursive=True))  # noqa: PTH207
+    if not found:
+        raise UsageError(f"{place}: no file matches; quote the pattern and check the folder")
+    return [Path(name) for name in found]
+
+
+def is_folder(place: Location) -> bool:
+    """Whether a folder is named: of a URL, a prefix of files.
+
+    Raises:
+        UsageError, RemoteError: see `Url.open`.
+    """
+    if isinstance(place, Url):
+        from mcap_landmarks.remote.store_listing import is_url_folder  # noqa: PLC0415 # not loaded for paths
+
+        return is_url_folder(place.text)
+    return to_read(place).is_dir()

@@ -18,6 +18,8 @@ DONE, UNUSABLE, USAGE, PARTIAL, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 _HARMFUL = re.compile(r"[\0-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 """What acts on a terminal or forges lines: control characters of both sets, those that turn the direction of writing
 (Unicode Standard Annex 9), line separators, and halves of pairs, which no encoding of text has."""
+_bars: list[object] = []
+"""The bar that is shown."""
 _HELP = "see mcap-landmarks --help"
 _STOPPED = "interrupted; nothing unfinished was left behind, and the next run goes on from finished stages"
 
@@ -163,9 +165,10 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 def progress(label: str, total: int | None = None, unit: str = "bytes") -> Iterator[Callable[[int], None]]:
     """A bar on stderr while the block runs, if stderr is a terminal; the block calls it with each advance.
 
-    It shows how much is done of what, how fast, and the time that is left. `unit` names what is counted.
+    It shows how much is done of what, how fast, and the time that is left. `unit` names what is counted. Within the
+    block of another bar there is none: what is done there is part of that one's work.
     """
-    if not sys.stderr.isatty():
+    if not sys.stderr.isatty() or _bars:
         yield lambda _advance: None
         return
     from rich.console import Console
@@ -194,4 +197,8 @@ def progress(label: str, total: int | None = None, unit: str = "bytes") -> Itera
     columns = [TextColumn("{task.description}", markup=False), BarColumn(), *amount, TimeRemainingColumn()]
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(harmless(label), total=total)
-        yield lambda advance: bar.update(task, advance=advance)
+        _bars.append(bar)
+        try:
+            yield lambda advance: bar.update(task, advance=advance)
+        finally:
+            _bars.pop()

@@ -10,9 +10,10 @@ from typing import Annotated
 import typer
 
 from mcap_landmarks import memory
-from mcap_landmarks.cli.console import heeding_signals, run_command
+from mcap_landmarks.cli.console import heeding_signals, progress, run_command, warn
 from mcap_landmarks.cli.option_groups import spread
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.remote.shown_copies import copies_shown
 
 _NOT_VERBS = {
     "__init__",
@@ -117,6 +118,6 @@ def run(arguments: list[str] | None = None) -> None:
     asked = _asked(given)
     named = f"{asked} " if asked in verbs() else ""
     application: Callable[..., object] = build(asked, has_help=not named or given[:1] != [asked])
-    with heeding_signals():
+    with heeding_signals(), copies_shown(progress, warn):
         code = run_command(application, given, f"see mcap-landmarks {named}--help")
     sys.exit(code)

@@ -1,0 +1,104 @@
+"""A file in a store: its size, and its bytes from one place to another, always of the one that was opened."""
+
+import threading
+from collections.abc import Callable
+from typing import Protocol, cast
+
+from mcap_landmarks.remote.addresses import scheme_of
+from mcap_landmarks.remote.refusals import ChangedError, DroppedError, persistently
+from mcap_landmarks.remote.stores import Entry, FileSystem, is_web, store
+
+
+class StoredFile(Protocol):
+    """What a `RemoteFile` reads. `version` tells contents apart; empty where the store says nothing of it.
+
+    `begin` is what the opening already brought, from the first byte on.
+    """
+
+    size: int
+    version: str
+    begin: bytes
+
+    def bytes_of(self, start: int, end: int) -> bytes:
+        """The bytes from one place to another, in one request; may be called from several threads at once.
+
+        Raises:
+            Exception: what the libraries raise; see `refusals`.
+        """
+
+
+class WholeOnlyError(Exception):
+    """A web server gives no parts of files, or does not know their size. What it says of this one."""
+
+    def __init__(self, version: str, size: int | None) -> None:
+        super().__init__("the server gives no parts of files")
+        self.version, self.size = version, size
+
+
+def stored_file(text: str, is_closed: threading.Event) -> StoredFile:
+    """The file of a URL.
+
+    Raises:
+        RemoteError: there is none, or it cannot be read.
+        UsageError: as `store` says.
+        WholeOnlyError: as the class says.
+    """
+    file_system, path = store(text)
+    if is_web(text):
+        from mcap_landmarks.remote.web_file import WebFile  # noqa: PLC0415 # a library that other stores do without
+
+        return persistently(text, lambda: WebFile(file_system, text), is_closed)
+    kind = _PinnedFile if scheme_of(text) == "s3" else _CheckedFile
+    return persistently(text, lambda: kind(file_system, path), is_closed)
+
+
+def _version(entry: Entry) -> str:
+    """What a store says that changes with a content: by s3fs, gcsfs, adlfs and fsspec's own memory."""
+    names = ("ETag", "etag", "generation", "VersionId", "LastModified", "last_modified", "mtime", "created", "size")
+    return " ".join(str(value) for name in names if (value := entry.get(name)) is not None)
+
+
+def _size(entry: Entry, path: str) -> int:
+    if entry.get("type") == "directory":
+        raise IsADirectoryError(path)
+    return int(cast("int", entry.get("size")))
+
+
+class _PinnedFile:
+    """A file of S3, which is asked for parts of that ETag only."""
+
+    begin = b""
+
+    def __init__(self, file_system: FileSystem, path: str) -> None:
+        entry = file_system.info(path)
+        self.size, self.version = _size(entry, path), _version(entry)
+        opened = file_system.open(path, "rb", cache_type="none")
+        self._get: Callable[[int, int], bytes] = opened.cache.fetcher  # type: ignore[attr-defined] # fsspec's files
+
+    def bytes_of(self, start: int, end: int) -> bytes:
+        """See `StoredFile`."""
+        return _whole(self._get(start, end), start, end)
+
+
+class _CheckedFile:
+    """A file of any other store: after each part it is asked whether the file is still the same."""
+
+    begin = b""
+
+    def __init__(self, file_system: FileSystem, path: str) -> None:
+        self._file_system, self._path = file_system, path
+        entry = file_system.info(path)
+        self.size, self.version = _size(entry, path), _version(entry)
+
+    def bytes_of(self, start: int, end: int) -> bytes:
+        """See `StoredFile`."""
+        found = self._file_system.cat_file(self._path, start, end)
+        if _version(self._file_system.info(self._path)) != self.version:
+            raise ChangedError
+        return _whole(found, start, end)
+
+
+def _whole(found: bytes, start: int, end: int) -> bytes:
+    if len(found) != end - start:
+        raise DroppedError
+    return found
