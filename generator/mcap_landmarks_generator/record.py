@@ -2,9 +2,10 @@
 
 import importlib.metadata
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.manifest import GENERATE, RUN, Manifest
@@ -16,7 +17,9 @@ from mcap_landmarks_generator.checks import Staged
 from mcap_landmarks_generator.loading import effective
 from mcap_landmarks_generator.rendering import Darkroom, Messages
 from mcap_landmarks_generator.simulation import Simulation
+from mcap_landmarks_generator.trajectory import Steering
 
+TELEOP = "teleop"
 _JOBS_PER_WORKER = 4
 _MOST_WAITING = 20_000
 """Messages that wait for an image before them: some minutes of a log without images."""
@@ -31,33 +34,57 @@ class Summary:
     collisions: tuple[tuple[float, str], ...]
 
 
-def record(staged: Staged, path: Path, workers: int = 1, progress: Callable[[int], None] = lambda _: None) -> Summary:
+class ByHand(Steering, Protocol):
+    """Steers by keys, and sees each message once it is written."""
+
+    @property
+    def pressed(self) -> Sequence[tuple[int, str]]:
+        """The keys so far, each with its time in ns after the start."""
+
+    def see(self, message: Stamped) -> None:
+        """Take a message that was written."""
+
+
+def record(
+    staged: Staged,
+    path: Path,
+    workers: int = 1,
+    progress: Callable[[int], None] = lambda _: None,
+    by_hand: ByHand | None = None,
+) -> Summary:
     """Run a scenario and write what its sensors saw; the same scenario gives the same bytes, however many workers.
 
-    `progress` gets each full simulated second.
+    `progress` gets each full simulated second. A drive `by_hand` gives the same bytes for the same keys.
 
     Raises:
         ToolkitError: the robot got stuck, or the file cannot be written; no file is left then.
     """
-    if not staged.scenario.trajectory.waypoints:
+    if by_hand is None and not staged.scenario.trajectory.waypoints:
         raise ToolkitError(f"{staged.name}: trajectory.waypoints is empty; one with stop_s records a standing robot")
-    simulation = Simulation(staged)
+    simulation = Simulation(staged, by_hand)
     with create_recording(path, {RUN: manifest(staged).entries()}) as writer, Darkroom(staged, workers) as darkroom:
         for message in _in_order(simulation.run(progress), darkroom, workers):
             writer.add(message)
+            if by_hand is not None:
+                by_hand.see(message)
         counts = dict(writer.counts)
+        if by_hand is not None:
+            writer.metadata[RUN] = manifest(staged, by_hand.pressed).entries()
     collisions = tuple((time_ns / 1e9, name) for time_ns, name in simulation.collisions)
     return Summary(counts, simulation.end_ns / 1e9, collisions)
 
 
-def manifest(staged: Staged) -> Manifest:
-    """What the recording is made from: every value of the scenario, the seed, the versions that shape its bytes."""
+def manifest(staged: Staged, pressed: Sequence[tuple[int, str]] | None = None) -> Manifest:
+    """What the recording is made from: every value of the scenario, the seed, the versions that shape its bytes, and
+    the keys `pressed` with their times in ns after the start where it was driven by hand."""
     versions = {name: importlib.metadata.version(name) for name in ("pybullet", "opencv-python-headless", "numpy")}
+    keys = {} if pressed is None else {"keys": [list(press) for press in pressed]}
     return Manifest(
-        GENERATE,
+        GENERATE if pressed is None else TELEOP,
         config={"scenario": effective(staged.scenario)},
-        options={"scenario": staged.name, "versions": versions},
+        options={"scenario": staged.name, "versions": versions, **keys},
         seed=staged.scenario.seed,
+        generated=pressed is not None,
     )
 
 

@@ -132,8 +132,9 @@ class Darkroom:
 
 def _work(staged: Staged, pipe: "Connection") -> None:
     """Take images until nobody asks for more."""
-    # An interrupt reaches every process of a terminal; the first one ends the others.
+    # An interrupt and the terminal's end reach every process of a terminal; the first one ends the others.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
     photographer = Photographer(staged)
     try:
         while True:

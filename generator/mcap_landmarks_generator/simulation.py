@@ -24,12 +24,11 @@ from mcap_landmarks_generator.robot import (
     SCAN_FRAME,
     SCAN_FROM_LINK_M,
 )
-from mcap_landmarks_generator.trajectory import Driver
+from mcap_landmarks_generator.trajectory import STEPS_PER_COMMAND, Driver, Steering
 from mcap_landmarks_generator.world import STEP_NS, World
 
 Event = Stamped | ImageJob
 
-_STEPS_PER_COMMAND = 4
 _STEPS_PER_CONTACT_CHECK = 8
 _STUCK_AFTER_NS = 15 * 10**9
 _STUCK_WITHIN_M = 0.02
@@ -37,14 +36,19 @@ _STUCK_WITHIN_RAD = 0.05
 
 
 class Simulation:
-    """One run of a staged scenario; afterwards `collisions` and `end_ns` say how it went."""
+    """One run of a staged scenario; afterwards `collisions` and `end_ns` say how it went.
 
-    def __init__(self, staged: Staged) -> None:
+    Without `steering` the robot drives the scenario's way, and must not get stuck there.
+    """
+
+    def __init__(self, staged: Staged, steering: Steering | None = None) -> None:
         self.collisions: list[tuple[int, str]] = []
         """Time after the start in ns and id of the object, each time the robot runs into one."""
         self.end_ns = 0
         self._staged = staged
         scenario = staged.scenario
+        self._is_watched = steering is None
+        self._steering = steering or Driver(scenario.trajectory, staged.start, scenario.robot.speed_factor)
         self._history = History()
         self._camera = Camera(scenario.camera, scenario.seed, scenario.start_ns)
         self._lidar = Lidar(scenario.lidar, scenario.seed, scenario.start_ns)
@@ -74,21 +78,20 @@ class Simulation:
 
     def _events(self, progress: Callable[[int], None]) -> Iterator[Event | None]:
         """Messages and jobs as they are measured, and None after each step of time."""
-        staged = self._staged
-        trajectory, factor = staged.scenario.trajectory, staged.scenario.robot.speed_factor
-        driver = Driver(trajectory, staged.start, factor, _STEPS_PER_COMMAND * STEP_NS / 1e9)
+        staged, steering = self._staged, self._steering
         watch = _StuckWatch()
         yield static_transforms(staged.scenario.start_ns)
         with World(staged.objects, staged.start) as world:
             standing, step = False, 0
             self._history.append(world.robot.state(), standing)
-            while not driver.done:
-                if step % _STEPS_PER_COMMAND == 0:
+            while not steering.done:
+                if step % STEPS_PER_COMMAND == 0:
                     pose = true_poses(self._history, np.array([self._history.end_ns]))[0]
-                    command = driver.command(pose)
+                    command = steering.command(pose)
                     standing = command.standing
                     world.robot.drive(command.speed_mps, command.turn_radps)
-                    watch.look(pose, self._history.end_ns, standing, self)
+                    if self._is_watched:
+                        watch.look(pose, self._history.end_ns, standing, self)
                 world.move_walkers(self._history.end_ns / 1e9)
                 world.step()
                 step += 1

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from mcap_landmarks.geometry.angles import wrap
@@ -10,8 +11,13 @@ from numpy.typing import NDArray
 
 from mcap_landmarks_generator.robot import MAX_SPEED_MPS, MAX_TURN_RADPS
 from mcap_landmarks_generator.scenario import TrajectorySpec, Waypoint
+from mcap_landmarks_generator.world import STEP_NS
 
 Floats = NDArray[np.float64]
+
+STEPS_PER_COMMAND = 4
+COMMAND_NS = STEPS_PER_COMMAND * STEP_NS
+"""The wheels get a command at 62.5 Hz."""
 
 _ACCELERATION_MPS2 = 0.5
 _TURN_ACCELERATION_RADPS2 = 3.0
@@ -42,48 +48,51 @@ class Leg:
     index: int
 
 
-@dataclass(slots=True)
-class _Limits:
-    """Speeds and accelerations, all multiplied by the scenario's factor."""
+class Steering(Protocol):
+    """Drives the robot: asked every `COMMAND_NS` for the next command, until it is `done`."""
 
-    speed: float
-    turn: float
-    acceleration: float
-    turn_acceleration: float
+    @property
+    def done(self) -> bool:
+        """Whether the drive is over."""
+
+    def command(self, pose: Floats) -> Command:
+        """The next command for a robot at x, y, heading (3,)."""
+
+
+class Motion:
+    """What a robot's wheels can follow: its limits, all multiplied by the scenario's factor, and its speeds now."""
+
+    def __init__(self, factor: float) -> None:
+        self.most_mps, self.most_radps = MAX_SPEED_MPS * factor, MAX_TURN_RADPS * factor
+        self.acceleration, self.turn_acceleration = _ACCELERATION_MPS2 * factor, _TURN_ACCELERATION_RADPS2 * factor
+        self.speed_mps = self.turn_radps = 0.0
+
+    def towards(self, speed_mps: float, turn_radps: float, *, standing: bool) -> Command:
+        """Approach the wanted speeds as fast as the accelerations allow."""
+        change = self.acceleration * COMMAND_NS / 1e9
+        self.speed_mps += float(np.clip(speed_mps - self.speed_mps, -change, change))
+        change = self.turn_acceleration * COMMAND_NS / 1e9
+        self.turn_radps += float(np.clip(turn_radps - self.turn_radps, -change, change))
+        return Command(self.speed_mps, self.turn_radps, standing)
 
 
 class Driver:
-    """Asked at a fixed rate for the next command; `done` once the last leg is over."""
+    """Steers along a scenario's way; `done` once the last leg is over."""
 
-    def __init__(self, trajectory: TrajectorySpec, start: Floats, speed_factor: float, period_s: float) -> None:
+    def __init__(self, trajectory: TrajectorySpec, start: Floats, speed_factor: float) -> None:
         self.legs = legs_of(trajectory, start)
         self.done = False
         self.leg: Leg | None = None
         self._lookahead_m = trajectory.lookahead_m
-        self._period_s = period_s
-        self._limits = _Limits(
-            MAX_SPEED_MPS * speed_factor,
-            MAX_TURN_RADPS * speed_factor,
-            _ACCELERATION_MPS2 * speed_factor,
-            _TURN_ACCELERATION_RADPS2 * speed_factor,
-        )
-        self._speed = self._turn = 0.0
+        self._motion = Motion(speed_factor)
         self._pose = start
         self._steps = self._drive()
 
     def command(self, pose: Floats) -> Command:
-        """The next command for a robot at x, y, heading (3,)."""
+        """See `Steering`."""
         self._pose = pose
         speed, turn, standing = next(self._steps, (0.0, 0.0, False))
-        return Command(self._limited(speed, turn), self._turn, standing)
-
-    def _limited(self, speed: float, turn: float) -> float:
-        """Approach the wanted speeds as fast as the accelerations allow; gives the forward speed."""
-        change = self._limits.acceleration * self._period_s
-        self._speed += float(np.clip(speed - self._speed, -change, change))
-        change = self._limits.turn_acceleration * self._period_s
-        self._turn += float(np.clip(turn - self._turn, -change, change))
-        return self._speed
+        return self._motion.towards(speed, turn, standing=standing)
 
     def _drive(self) -> Iterator[tuple[float, float, bool]]:
         """Wanted speeds and whether the robot stands at a stop, one after the other; ends with the last leg."""
@@ -98,25 +107,25 @@ class Driver:
             if leg.stop.heading_deg is not None:
                 yield from self._turn_to(np.deg2rad(leg.stop.heading_deg))
             yield from self._come_to_rest()
-            for _ in range(round(leg.stop.stop_s / self._period_s)):
+            for _ in range(round(leg.stop.stop_s / (COMMAND_NS / 1e9))):
                 yield 0.0, 0.0, True
         self.done = True
 
     def _come_to_rest(self) -> Iterator[tuple[float, float, bool]]:
-        while self._speed or self._turn:
+        while self._motion.speed_mps or self._motion.turn_radps:
             yield 0.0, 0.0, False
         # The wheels follow a little later.
-        for _ in range(round(0.1 / self._period_s)):
+        for _ in range(round(0.1 / (COMMAND_NS / 1e9))):
             yield 0.0, 0.0, False
 
     def _turn_to(self, heading_rad: float) -> Iterator[tuple[float, float, bool]]:
         """Turn on the spot, slower towards the end."""
         while True:
             error = float(wrap(heading_rad - self._pose[2]))
-            if abs(error) < _ARRIVED_RAD and abs(self._turn) < 10 * _LEAST_TURN_RADPS:
+            if abs(error) < _ARRIVED_RAD and abs(self._motion.turn_radps) < 10 * _LEAST_TURN_RADPS:
                 return
-            braking = np.sqrt(2 * _BRAKING * self._limits.turn_acceleration * abs(error))
-            wanted = max(_LEAST_TURN_RADPS, min(self._limits.turn, braking, 8.0 * abs(error)))
+            braking = np.sqrt(2 * _BRAKING * self._motion.turn_acceleration * abs(error))
+            wanted = max(_LEAST_TURN_RADPS, min(self._motion.most_radps, braking, 8.0 * abs(error)))
             yield 0.0, float(np.copysign(wanted, error)), False
 
     def _follow(self, way_xy: Floats) -> Iterator[tuple[float, float, bool]]:
@@ -131,10 +140,10 @@ class Driver:
             aim = _point_at(way_xy, ends, passed + self._lookahead_m) - self._pose[:2]
             sideways = -np.sin(self._pose[2]) * aim[0] + np.cos(self._pose[2]) * aim[1]
             curvature = float(2 * sideways / (aim @ aim))
-            braking = np.sqrt(2 * _BRAKING * self._limits.acceleration * left)
+            braking = np.sqrt(2 * _BRAKING * self._motion.acceleration * left)
             bend = max(abs(curvature), 1e-9)
-            cornering = min(0.8 * self._limits.turn / bend, np.sqrt(_SIDEWAYS_MPS2 / bend))
-            speed = max(_LEAST_SPEED_MPS, min(self._limits.speed, braking, cornering, 8.0 * left))
+            cornering = min(0.8 * self._motion.most_radps / bend, np.sqrt(_SIDEWAYS_MPS2 / bend))
+            speed = max(_LEAST_SPEED_MPS, min(self._motion.most_mps, braking, cornering, 8.0 * left))
             yield speed, speed * curvature, False
 
     def _left(self, way_xy: Floats, ends: Floats, passed: float) -> float:

@@ -30,6 +30,7 @@ LINES = {
     "foxglove": "foxglove {result} -o {output}",
     "fuse": "fuse {logs} -o {output} --extrinsics {extrinsics} --config {config_file}",
     "generate": "generate small -o {output}",
+    "teleop": "teleop small -o {output} --model {model}",
     "info": "info {paths} --definitions {definitions}",
     "landmarks export": "landmarks export {database} {file}",
     "landmarks import": "landmarks import {database} {file}",

@@ -26,7 +26,7 @@ def driven() -> History:
     with World((), START) as world:
         history.append(world.robot.state(), standing=False)
         way = TrajectorySpec(waypoints=(Waypoint(at=(5.0, 0.0)), Waypoint(at=(11.0, 5.0), heading_deg=-90.0)))
-        driver = Driver(way, START, 4.0, 4 * STEP_NS / 1e9)
+        driver = Driver(way, START, 4.0)
         step = 0
         while not driver.done and step < 10_000:
             if step % 4 == 0:

@@ -22,6 +22,7 @@ _NOT_VERBS = {
     "option_groups",
     "options",
     "stage_runs",
+    "terminal",
     "conversion_options",
     "diff_drives",
     "diff_options",
