@@ -6,6 +6,7 @@ from typing import BinaryIO
 from mcap import records
 
 from mcap_landmarks.recording.container import CHUNK, RECORD, Opcode, read_up_to
+from mcap_landmarks.recording.reading_ahead import gather_indexed
 from mcap_landmarks.recording.record_shapes import ReadAt, fits, head_at
 
 _BETWEEN = {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE_INDEX, Opcode.ATTACHMENT, Opcode.METADATA, Opcode.DATA_END}
@@ -36,6 +37,7 @@ def check_index(
         stream.seek(offset)
         return read_up_to(stream, size)
 
+    gather_indexed(stream, chunks, with_indexes=not is_covered)
     offset, end = data
     unverified = 0
     found: set[int] = set()

@@ -1,5 +1,6 @@
 """From a file's name to the index of the recording in it, or to a refusal that names the file."""
 
+from pathlib import Path
 from struct import error as struct_error
 from typing import BinaryIO
 
@@ -10,6 +11,7 @@ from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.locations import Location, to_read
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.container import MAGIC, RECORD, Opcode, parse
+from mcap_landmarks.recording.reading_ahead import gather_ends
 from mcap_landmarks.recording.rebuild_index import index_by_scanning
 from mcap_landmarks.recording.record_shapes import check_content
 from mcap_landmarks.recording.summary_index import Index, index_from_summary, read_record
@@ -20,9 +22,10 @@ def open_stream(path: Location) -> BinaryIO:
 
     Raises:
         RecordingError: there is none, or it may not be read.
+        RemoteError: the same of a file elsewhere.
     """
     try:
-        return to_read(path).open("rb")
+        return (to_read(path) if isinstance(path, Path) else path).open("rb")
     except FileNotFoundError as error:
         raise RecordingError(f"{path}: there is no such file; check the path") from error
     except IsADirectoryError as error:
@@ -45,6 +48,7 @@ def index_of(path: Location, stream: BinaryIO, *, from_front: bool, progress: Pr
     stream.seek(0)
     if size == 0:
         raise RecordingError(f"{path} is empty (0 bytes); record or copy it again")
+    gather_ends(stream, size)
     if not begins_or_ends(stream, size):
         raise RecordingError(f"{path} is not an MCAP file; mcap-landmarks convert reads bags and data sets")
     if size == len(MAGIC):

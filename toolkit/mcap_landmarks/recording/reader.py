@@ -1,7 +1,6 @@
 """Read recordings: by index where there is one, by scanning where there is none, in the order of log time."""
 
 import contextlib
-import hashlib
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextvars import ContextVar
 from functools import cached_property, partial
@@ -21,12 +20,14 @@ from mcap_landmarks.recording.blocks import DamagedBlockError, block_content
 from mcap_landmarks.recording.channel_columns import ChannelColumns, GatheredBlocks, Wanted, rows_in
 from mcap_landmarks.recording.chunk_copy import WholeChunk, read_whole
 from mcap_landmarks.recording.chunk_messages import Open, drain, push
-from mcap_landmarks.recording.container import CHUNK, RECORD, parse, read_up_to
+from mcap_landmarks.recording.container import parse
+from mcap_landmarks.recording.content_hash import has_every_crc, hash_of
 from mcap_landmarks.recording.damage import SuspectChunk
 from mcap_landmarks.recording.declared_channels import Declared
 from mcap_landmarks.recording.large_chunks import messages_of
 from mcap_landmarks.recording.opening import index_of, open_stream
 from mcap_landmarks.recording.overflow import Overflow
+from mcap_landmarks.recording.reading_ahead import reading
 from mcap_landmarks.recording.record_shapes import check_attachment
 from mcap_landmarks.recording.summary_index import Block, Index, indexed_messages, read_record
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
@@ -124,27 +125,16 @@ class Recording:
     def _hash(self, *, is_foreign: bool) -> str:
         """A hash over the blocks, all or those with messages that are no results: an append leaves these alone."""
         results = {key for key, connection in self._connections.items() if STAGE in connection.metadata}
-        digest = hashlib.sha256()
-        for block in self.index.blocks:
-            if is_foreign and block.channel_ids is not None and block.channel_ids <= results:
-                continue
-            self._stream.seek(block.offset)
-            if block.head:
-                digest.update(block.head[: CHUNK.size])
-            elif block.is_chunk:  # times, size and CRC stand for the content, which need not be read
-                digest.update(self._stream.read(RECORD.size + CHUNK.size)[RECORD.size :])
-            else:
-                digest.update(read_up_to(self._stream, block.length))
-        return digest.hexdigest()
+        blocks = [
+            block
+            for block in self.index.blocks
+            if not (is_foreign and block.channel_ids is not None and block.channel_ids <= results)
+        ]
+        return hash_of(self._stream, blocks)
 
     def content_hash(self) -> str | None:
         """A hash over all chunks, None if some content has no CRC to stand for it."""
-        for block in self.index.blocks:
-            if block.is_chunk:
-                self._stream.seek(block.offset + RECORD.size + CHUNK.size - 4)
-                if self._stream.read(4) == bytes(4):
-                    return None
-        return self._hash(is_foreign=False)
+        return self._hash(is_foreign=False) if has_every_crc(self._stream, self.index.blocks) else None
 
     def attachments(self) -> Iterator[records.Attachment]:
         """The attachments, whole, in the order of the file; those that are damaged are told in `losses`."""
@@ -193,10 +183,11 @@ class Recording:
         within, key = (start_ns or 0, 2**64 if end_ns is None else end_ns), self._ids[connection]
         empty = empty_table(layout, fields)
         wanted, found = Wanted(key, layout, empty.columns, within), GatheredBlocks(empty, self.index.counts.get(key, 0))
-        for block in self._blocks({key: connection}, *within):
-            rows = self._take(block, partial(rows_in, self._stream, block, wanted), progress)
-            if rows is not None:
-                found.add(rows)
+        with reading(self._stream, self._blocks({key: connection}, *within), self.index.blocks) as blocks:
+            for block in blocks:
+                rows = self._take(block, partial(rows_in, self._stream, block, wanted), progress)
+                if rows is not None:
+                    found.add(rows)
         return found.columns()
 
     def pieces(
@@ -215,8 +206,9 @@ class Recording:
         wanted, first, last = self._wanted(connections), start_ns or 0, 2**64 if end_ns is None else end_ns
         ids = frozenset(self._wanted(kept)) & wanted.keys()
         active: Open = []
-        with Overflow(self.path) as overflow:
-            for number, block in enumerate(self._blocks(wanted, first, last)):
+        meant = self._blocks(wanted, first, last)
+        with reading(self._stream, meant, self.index.blocks) as blocks, Overflow(self.path) as overflow:
+            for number, block in enumerate(blocks):
                 yield from chain.from_iterable(drain(active, block.start_ns))
                 chunk = None
                 if first <= block.start_ns and block.end_ns < last:
@@ -291,8 +283,9 @@ class Recording:
     ) -> Iterator[Iterable[RawMessage]]:
         """Messages in the order of time, in runs of one block; blocks may overlap."""
         active: Open = []
-        with Overflow(self.path) as overflow:
-            for number, block in enumerate(self._blocks(wanted, *within_ns)):
+        meant = self._blocks(wanted, *within_ns)
+        with reading(self._stream, meant) as blocks, Overflow(self.path) as overflow:
+            for number, block in enumerate(blocks):
                 yield from drain(active, block.start_ns)
                 found, size = self._load(block, wanted, progress)
                 push(active, number, overflow.kept(active, number, found, size), *within_ns)

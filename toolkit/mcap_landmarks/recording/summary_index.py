@@ -14,6 +14,7 @@ from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.container import FOOTER_SIZE, MAGIC, RECORD, Opcode, parse, read_up_to
 from mcap_landmarks.recording.damage import Damage
 from mcap_landmarks.recording.index_check import DistrustedIndexError, check_index
+from mcap_landmarks.recording.reading_ahead import gather_part
 from mcap_landmarks.stage import Connection
 
 MESSAGE_START = Struct("<HIQ")
@@ -150,6 +151,7 @@ def read_summary(stream: BinaryIO, size: int) -> Summary:
         return Summary(footer)
     if not len(MAGIC) < footer.summary_start <= size - tail:
         return Summary(footer, is_damaged=True)
+    gather_part(stream, (footer.summary_start, size))
     stream.seek(footer.summary_start)
     section = stream.read(size - tail - footer.summary_start)
     crc = crc32(end[: FOOTER_SIZE - 4], crc32(section))

@@ -7,9 +7,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import NamedTuple
 
 from mcap_landmarks import memory
-
-Part = tuple[int, int]
-"""From one place of a file to another."""
+from mcap_landmarks.remote.announced_file import Part
 
 AT_ONCE = 16
 JOINED_GAP = 32 << 10

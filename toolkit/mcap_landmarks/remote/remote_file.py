@@ -9,7 +9,8 @@ from itertools import pairwise
 from typing import cast
 
 from mcap_landmarks.remote import kept_parts
-from mcap_landmarks.remote.reading_plan import AT_ONCE, Part, ReadingPlan, joined
+from mcap_landmarks.remote.announced_file import AnnouncedFile, Part
+from mcap_landmarks.remote.reading_plan import AT_ONCE, ReadingPlan, joined
 from mcap_landmarks.remote.refusals import persistently
 from mcap_landmarks.remote.stored_file import StoredFile
 
@@ -18,7 +19,7 @@ _LEAST, _MOST_IN_ROW = 16 << 10, 4 << 20
 _ROW_AHEAD = 16 << 20
 
 
-class RemoteFile(io.RawIOBase):
+class RemoteFile(AnnouncedFile):
     """See the file's docstring. `text` is the URL; for one thread at a time.
 
     Every read raises RemoteError if the file cannot be read, or is another than when it was opened.
@@ -82,7 +83,7 @@ class RemoteFile(io.RawIOBase):
 
     @contextmanager
     def expecting(self, parts: Iterable[Part]) -> Iterator[None]:
-        """Fetch these ahead of need, in this order, while the block runs: each is read once, whole."""
+        """See `AnnouncedFile`."""
         plan = ReadingPlan(parts, self._fetch, self._pool)
         plan.start()
         self._plans.append(plan)
@@ -94,7 +95,7 @@ class RemoteFile(io.RawIOBase):
                 self._plans.remove(plan)
 
     def gather(self, parts: Iterable[Part]) -> None:
-        """Fetch small parts at once, and keep them: they will be read more than once."""
+        """See `AnnouncedFile`."""
         wanted = sorted((max(start, 0), min(end, self._stored.size)) for start, end in parts)
         missing = [part for part in wanted if part[0] < part[1] and not self._has(*part)]
         groups = list(joined(missing))
