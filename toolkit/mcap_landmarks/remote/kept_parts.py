@@ -54,5 +54,10 @@ class _AllKept:
                 self._of.popitem(last=False)
         return found
 
+    def forget(self) -> None:
+        """Keep nothing of what was read so far."""
+        with self._lock:
+            self._of.clear()
+
 
 ALL = _AllKept()
