@@ -61,6 +61,41 @@ def test_json_documents(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     assert document["stages"] == {"localize": "ran"}
 
 
+def test_a_map_is_the_same_whatever_the_order_of_its_logs(folder: Path, tmp_path: Path) -> None:
+    """To the last byte, with the logs' own results."""
+    for name, order in (("one", ("a", "b")), ("other", ("b", "a"))):
+        (tmp_path / name).mkdir()
+        logs = [folder / f"{log}.mcap" for log in order]
+        assert call("map", *logs, "--map", tmp_path / name / "map.db", "-o", tmp_path / name / "out") == 0
+    for name in ("map.db", "out/a.mcap", "out/b.mcap"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
+
+
+@pytest.mark.slow
+def test_a_log_that_does_not_fit_is_left_out_by_name(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With exit 3, and again where its map is found; of two logs, both of which may be wrong, there is no map."""
+    renamed = {f"tag {i}": f"other {i}" for i in range(15)}
+    strange = write(tmp_path / "strange.mcap", messages(seed=3, renamed=renamed))
+    logs = (folder / "a.mcap", strange, folder / "b.mcap")
+    for state in ("ran", "reused"):
+        assert call("map", *logs, "--map", tmp_path / "map.db", "-o", tmp_path / "out", "--json") == 3
+        document, told = json.loads((printed := capsys.readouterr()).out), printed.err
+        jsonschema.validate(document, schema_of("map"))
+        reason = "cannot be laid on the rest of the map: too few landmarks in common"
+        assert f"warning: {strange}: left out of the map: {reason}" in told
+        assert [log["path"] for log in document["logs"]] == [str(log) for log in logs]
+        assert [log.get("excluded") for log in document["logs"]] == [None, reason, None]
+        assert document["logs"][1]["used"] == 0
+        assert document["stages"]["build_map"] == state
+    assert call("map", logs[0], logs[2], "--map", tmp_path / "without.db", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["landmarks"] == document["landmarks"]
+    assert "/landmarks/map_pose" not in topics(tmp_path / "out" / "strange.mcap")
+    line = refused(capsys, 1, "map", *logs[:2], "--map", tmp_path / "two.db")
+    assert reason in line
+
+
 @pytest.mark.slow
 def test_twice_the_same_bytes(folder: Path, tmp_path: Path) -> None:
     assert call("map", folder / "a.mcap", "--map", tmp_path / "again.db") == 0

@@ -19,7 +19,7 @@ CLASSES = np.array([0, 1, 0, 1, 0, 1])
 def aligned(map_xy: Array, map_ids: np.ndarray, rows: list[int], config: BuildMapConfig = CONFIG) -> Array | None:
     """Where a log that saw some of the map's landmarks lies in it."""
     seen = se2.transform_points(se2.inverse(MOVE), map_xy[rows])
-    return align_maps(map_ids[rows], seen, map_ids, map_xy, config)
+    return align_maps(map_ids[rows], seen, map_ids, map_xy, config).pose
 
 
 def found(pose: Array | None) -> bool:
@@ -38,7 +38,7 @@ def test_most_landmarks_win_over_those_that_are_not_there() -> None:
     ids = np.concatenate([CLASSES, [1, 0]])
     seen = se2.transform_points(se2.inverse(MOVE), crowd[:6])
     seen[0] += 3.0
-    assert found(align_maps(ids[:6], seen, ids, crowd, CONFIG))
+    assert found(align_maps(ids[:6], seen, ids, crowd, CONFIG).pose)
 
 
 def test_two_landmarks_do_where_all_classes_differ_and_not_where_they_repeat() -> None:
@@ -51,7 +51,7 @@ def test_two_landmarks_do_where_all_classes_differ_and_not_where_they_repeat() -
 @pytest.mark.parametrize("classes", [np.full(6, 7), np.array([1, 0, 1, 0, 1, 0])])
 def test_landmarks_of_other_classes_are_no_partners(classes: np.ndarray) -> None:
     seen = se2.transform_points(se2.inverse(MOVE), MAP)
-    assert align_maps(classes, seen, CLASSES, MAP, CONFIG) is None
+    assert align_maps(classes, seen, CLASSES, MAP, CONFIG).pose is None
 
 
 def test_a_place_that_looks_alike_two_ways_is_refused() -> None:
@@ -72,7 +72,7 @@ def test_a_bit_off_is_not_another_place() -> None:
     """Poses of the right pairs differ by less than four tolerances and half a radian."""
     rng = np.random.default_rng(0)
     seen = se2.transform_points(se2.inverse(MOVE), MAP) + rng.normal(0, 0.1, MAP.shape)
-    assert found(align_maps(CLASSES, seen, CLASSES, MAP, CONFIG))
+    assert found(align_maps(CLASSES, seen, CLASSES, MAP, CONFIG).pose)
 
 
 @pytest.mark.parametrize(("off_m", "fits"), [(0.5, True), (0.7, False)])
@@ -80,12 +80,12 @@ def test_a_partner_is_within_the_tolerance(off_m: float, fits: bool) -> None:
     """Three of one class, of which the third is off; it is too far to make pairs itself."""
     row = np.array([[0.0, 0.0], [1.5, 0.0], [0.0, 21.0]])
     seen = np.add(row, [[0, 0], [0, 0], [off_m, 0]])
-    pose = align_maps(np.array([0, 1, 2]), seen, np.array([0, 1, 2]), row, CONFIG)
+    pose = align_maps(np.array([0, 1, 2]), seen, np.array([0, 1, 2]), row, CONFIG).pose
     assert pose is not None
     three = np.array([0, 1, 1])
-    assert (align_maps(three, seen, three, row, CONFIG) is not None) is fits
+    assert (align_maps(three, seen, three, row, CONFIG).pose is not None) is fits
     wider = replace(CONFIG, join_tolerance_m=0.8)
-    assert align_maps(three, seen, three, row, wider) is not None
+    assert align_maps(three, seen, three, row, wider).pose is not None
 
 
 def test_pairs_up_to_the_reach_say_how_maps_lie() -> None:
@@ -104,7 +104,7 @@ def test_lengths_that_differ_by_half_a_metre_are_not_alike() -> None:
     stretched = np.array([[0.0, 0.0], [8.0, 0.0]])
     for length, fits in ((8.45, True), (8.55, False)):
         seen = np.array([[0.0, 0.0], [length, 0.0]])
-        pose = align_maps(np.arange(2), seen, np.arange(2), stretched, CONFIG)
+        pose = align_maps(np.arange(2), seen, np.arange(2), stretched, CONFIG).pose
         assert (pose is not None) is fits
         if pose is not None:  # middle on middle
             np.testing.assert_allclose(pose, [4 - length / 2, 0, 0], atol=1e-12)
@@ -118,5 +118,21 @@ def test_in_a_crowd_so_many_pairs_are_tried_as_are_needed() -> None:
 
 def test_nothing_seen_lies_nowhere() -> None:
     none, no_ids = np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
-    assert align_maps(no_ids, none, CLASSES, MAP, CONFIG) is None
-    assert align_maps(CLASSES, MAP, no_ids, none, CONFIG) is None
+    assert align_maps(no_ids, none, CLASSES, MAP, CONFIG).pose is None
+    assert align_maps(CLASSES, MAP, no_ids, none, CONFIG).pose is None
+
+
+def test_three_of_many_landmarks_that_fit_by_chance_do_not_say_where_a_log_lies() -> None:
+    """The others stand where the map has none of their class, beside some that it has."""
+    seen = np.add(MAP, [[0, 0]] * 3 + [[1.8, 0]] * 3)
+    assert align_maps(CLASSES[:4], seen[:4], CLASSES, MAP, CONFIG).pose is not None
+    refused = align_maps(CLASSES, seen, CLASSES, MAP, CONFIG)
+    assert refused.pose is None
+    assert refused.reason == "where it fits best, most of its landmarks stand beside others"
+
+
+def test_the_reason_for_no_pose_is_told() -> None:
+    assert align_maps(CLASSES[[1, 4]], MAP[[1, 4]], CLASSES, MAP, CONFIG).reason == "too few landmarks in common"
+    square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
+    alike = np.zeros(4, dtype=np.int64)
+    assert align_maps(alike, square, alike, square, CONFIG).reason == "it fits in several ways"

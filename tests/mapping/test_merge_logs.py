@@ -1,10 +1,10 @@
 """Several logs' landmarks as one numbered list."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry import se2
 from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.data_association import UNLABELLED
@@ -41,18 +41,47 @@ def test_landmarks_that_are_known_come_first() -> None:
     assert merged.class_ids.tolist() == CLASSES[:5].tolist()
 
 
-def test_logs_are_merged_in_whatever_order_they_can_be() -> None:
+def test_the_log_with_most_landmarks_begins_and_then_comes_what_has_most_in_common() -> None:
     """The second has nothing in common with the first, but with the third."""
     merged = merge_logs(
         [submap([0, 1, 2, 3], np.zeros(3)), submap([5, 6, 7]), submap([2, 3, 1, 5, 6, 7])], None, CONFIG
     )
-    assert [numbers.tolist() for numbers in merged.of_log] == [[0, 1, 2, 3], [4, 5, 6], [2, 3, 1, 4, 5, 6]]
+    assert merged.order == (2, 0, 1)
+    assert [numbers.tolist() for numbers in merged.of_log] == [[6, 2, 0, 1], [3, 4, 5], [0, 1, 2, 3, 4, 5]]
 
 
-def test_logs_that_cannot_be_laid_on_the_rest_are_named() -> None:
+def test_the_order_of_logs_decides_only_between_equals() -> None:
+    logs = [submap([0, 1, 2, 3, 4]), submap([3, 2, 1, 5, 6, 7]), submap([2, 5, 6, 7]), submap([0, 1, 2])]
+    merged = merge_logs(logs, None, CONFIG)
+    for order in itertools.permutations(range(4)):
+        again = merge_logs([logs[i] for i in order], None, CONFIG)
+        assert [order[row] for row in again.order] == list(merged.order)
+        for i, numbers in zip(order, again.of_log, strict=True):
+            assert numbers.tolist() == merged.of_log[i].tolist()
+        assert (again.positions_xy == merged.positions_xy).all()
+
+
+def test_logs_that_cannot_be_laid_on_the_rest_are_left_out() -> None:
     alone = [submap([0, 1, 2, 3], np.zeros(3)), submap([4, 5, 6]), submap([1, 2, 3]), submap([7])]
-    with pytest.raises(MapError, match=r"^log 2, 4 cannot be laid on the rest of the map: too few"):
-        merge_logs(alone, None, CONFIG)
+    merged = merge_logs(alone, None, CONFIG)
+    assert merged.order == (0, 2)
+    assert (merged.of_log[1], merged.of_log[3]) == (None, None)
+    assert dict(merged.reasons) == dict.fromkeys((1, 3), "too few landmarks in common")
+
+
+def test_of_groups_that_have_nothing_in_common_the_one_of_most_logs_is_the_map() -> None:
+    """Though a log of the other begins, which has more landmarks."""
+    other = submap([0, 1, 2, 3, 4])
+    far = [replace(other, class_ids=other.class_ids + 7), replace(submap([0, 1, 2]), class_ids=CLASSES[:3] + 7)]
+    merged = merge_logs([far[0], submap([0, 1, 2, 3]), far[1], submap([1, 2, 3]), submap([3, 2, 1])], None, CONFIG)
+    assert merged.order == (1, 3, 4)
+    assert [i for i, numbers in enumerate(merged.of_log) if numbers is None] == [0, 2]
+
+
+def test_what_is_spare_begins_nothing_and_does_not_count() -> None:
+    logs = [submap([0, 1, 2]), submap([1, 2, 3, 4, 5, 6]), submap([7])]
+    assert merge_logs(logs, None, CONFIG, spare=[1, 2]).order == (0,)
+    assert merge_logs(logs, None, CONFIG, spare=[2]).order == (1,)
 
 
 @pytest.mark.parametrize(("off_m", "same"), [(1.7, True), (1.9, False)])

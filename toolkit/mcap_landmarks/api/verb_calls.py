@@ -106,7 +106,8 @@ def build_map(
             _options(asked, None).requests(places(logs, "logs")), database, target, maybe_place(prior, "prior")
         )
     for log in found.logs:
-        tell(log.recording, log.outcome.losses)
+        left_out = [f"left out of the map: {log.excluded}"] if log.excluded else []
+        tell(log.recording, [*log.outcome.losses, *left_out])
     return found
 
 

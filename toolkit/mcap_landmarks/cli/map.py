@@ -7,7 +7,7 @@ import typer
 
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.cli import options
-from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table
+from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
 from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, reading_logs
 from mcap_landmarks.cli.stage_runs import Given, tell, told
 from mcap_landmarks.errors import UsageError
@@ -41,7 +41,8 @@ def command(
 ) -> None:
     """Build one landmark map from LOG...; with -o also write each log with its results.
 
-    Where a log has no scene objects, they are made first, from images and scans.
+    Where a log has no scene objects, they are made first, from images and scans. The order of the logs does not matter;
+    of three or more, one that does not fit the others is left out and named.
     """
     database = check_target(map_file)
     if from_reference:
@@ -53,12 +54,14 @@ def command(
     run = build_map_of(asked.requests(logs), database, output, prior, progress)
     for log in run.logs:
         tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)
+        if log.excluded:
+            warn(f"warning: {log.recording}: left out of the map: {log.excluded}")
     tell(map_file, (), run.build.outcome.notes, ())
     if given.json:
         say_json("map", _document(run, database))
     else:
         _print(run, database)
-    if any(log.outcome.losses for log in run.logs):
+    if any(log.outcome.losses or log.excluded for log in run.logs):
         raise typer.Exit(PARTIAL)
 
 
@@ -103,6 +106,7 @@ def _document(run: "MapRun", database: Path) -> dict[str, object]:
                 "used": source.used,
                 **told(_stages(run, log)),
                 "losses": list(log.outcome.losses),
+                **({"excluded": log.excluded} if log.excluded else {}),
             }
             for log, source in zip(run.logs, run.sources, strict=True)
         ],

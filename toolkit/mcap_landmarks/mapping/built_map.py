@@ -1,5 +1,6 @@
 """What a map builder hands back: the map, where each robot drove, and how the solver ended."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -23,10 +24,12 @@ class LogTrajectory:
 class BuiltMap(NamedTuple):
     """A map, one trajectory in it per log, and how the solver ended; None where the method has none.
 
-    `left_out` counts per log the bundles that could not be laid on the rest.
+    `left_out` counts per log the bundles that could not be laid on the rest. `excluded` says by its row why a log is no
+    part of the map; that has no trajectory.
     """
 
     landmark_map: LandmarkMap
-    trajectories: list[LogTrajectory]
+    trajectories: Sequence[LogTrajectory | None]
     termination: Termination | None
     left_out: tuple[int, ...] = ()
+    excluded: Mapping[int, str] = {}

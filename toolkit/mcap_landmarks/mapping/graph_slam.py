@@ -22,6 +22,8 @@ Ints = NDArray[np.int64]
 
 # 99 % of right observations lie within this squared distance: chi-square with 2 degrees of freedom.
 _INLIER = 9.21
+WRONG = 0.1
+"""Below this weight the joint solution took an observation for wrong: with one degree of freedom, 3 sigmas or more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +59,15 @@ class MapSolution:
 
 
 def solve_map(
-    logs: Sequence[LandmarkObservations], config: BuildMapConfig, known: KnownLandmarks | None = None
+    logs: Sequence[LandmarkObservations],
+    config: BuildMapConfig,
+    known: KnownLandmarks | None = None,
+    alone: Sequence[LogSolution] = (),
 ) -> MapSolution:
     """Optimise the poses of all logs and the landmarks they saw (thesis Algorithm 4's task, as a pose-landmark graph).
 
-    Each log is solved alone and its noise estimated, then all come into one frame by the landmarks that they share.
+    Each log is solved alone and its noise estimated, unless that is known (`alone`), then all come into one frame by
+    the landmarks that they share.
 
     Raises:
         MapError: no log, a log without an observation, one that shares fewer than two landmarks with the others, or no
@@ -69,7 +75,7 @@ def solve_map(
     """
     if not logs or not all(len(log.pose) for log in logs):
         raise MapError("a log without a single observation of a landmark cannot be mapped; leave it out")
-    alone = [solve_with_its_noise(log, config) for log in logs]
+    alone = alone or [solve_with_its_noise(log, config) for log in logs]
     numbers, solved = _solve_together(logs, alone, config, known)
     most = max(solved.termination.iterations, *(log.iterations for log in alone))
     termination = replace(solved.termination, iterations=most)

@@ -1,16 +1,16 @@
 """Landmarks that several logs saw, each in a frame of its own, as one numbered list."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from mcap_landmarks.errors import MapError
 from mcap_landmarks.geometry.se2 import Array, transform_points
 from mcap_landmarks.mapping.config import BuildMapConfig
-from mcap_landmarks.mapping.map_alignment import align_maps
+from mcap_landmarks.mapping.map_alignment import Alignment, align_maps
 from mcap_landmarks.mapping.submap import Submap
 
 Ints = NDArray[np.int64]
@@ -20,6 +20,9 @@ _FIRM = 3
 # A log lies on the map by a pair of landmarks, whose errors grow with the distance from them, so that others may be so
 # many tolerances from their partners.
 _SAME_TOLERANCES = 3
+# Logs with this share of the most landmarks in common are laid at once: the pose of each is the better for those that
+# come before only where these add to what it has in common, and weaker ones wait for that.
+_STRONG = 0.5
 # A pair beyond that costs as much as a thousand at it, so that one more pair within is worth more than closer ones.
 _BEYOND_REACH = 1e3
 
@@ -28,12 +31,15 @@ _BEYOND_REACH = 1e3
 class MergedLandmarks:
     """G landmarks of all logs: class_ids (G,), rough positions (G, 2); per log, the number (L,) of its L landmarks.
 
-    None for a log that may be left out and could not be laid on the others.
+    None for a log that could not be laid on the others, for a reason; `order` are the rows of those that were, in which
+    they were.
     """
 
     class_ids: Ints
     positions_xy: Array
     of_log: tuple[Ints | None, ...]
+    order: tuple[int, ...]
+    reasons: Mapping[int, str]
 
 
 def merge_logs(
@@ -41,41 +47,79 @@ def merge_logs(
 ) -> MergedLandmarks:
     """Number the landmarks of all logs; those of a map that exists already, `known` (Q,) and (Q, 2), come first.
 
-    Logs are merged one by one, whichever can be laid on what is there; landmarks of a class within three times
-    `join_tolerance_m` of each other are then the same one.
-
-    Raises:
-        MapError: a log that is not `spare` cannot be laid on the others, or fits in several ways.
+    Without one, the log with most firm landmarks begins. Then always those are laid on what is there that have most in
+    common with it; landmarks of a class within three times `join_tolerance_m` of each other are then the same one. Of
+    those that remain another group may begin so, and the group of most logs counts. `spare` logs, which begin none and
+    do not count, are what their odometry lost of others. The rows decide only between equals.
     """
-    numbers: dict[int, Ints] = {}
-    if known is None:
-        class_ids, positions = logs[0].class_ids, logs[0].positions_xy
-        numbers[0] = np.arange(len(class_ids))
-    else:
-        class_ids, positions = known
-    while len(numbers) < len(logs):
-        for i in [i for i in range(len(logs)) if i not in numbers]:
-            own = logs[i]
-            observations = np.bincount(own.landmark[own.landmark >= 0], minlength=len(own.class_ids))
-            firm = observations >= min(_FIRM, observations.max(initial=0))
-            pose = align_maps(own.class_ids[firm], own.positions_xy[firm], class_ids, positions, config)
-            if pose is None:
-                continue
-            there = transform_points(pose, own.positions_xy)
-            numbers[i] = _match(own.class_ids, there, class_ids, positions, _SAME_TOLERANCES * config.join_tolerance_m)
-            new = numbers[i] >= len(class_ids)
-            class_ids = np.concatenate([class_ids, own.class_ids[new]])
-            positions = np.concatenate([positions, there[new]])
-            break
-        else:
-            lost = ", ".join(str(i + 1) for i in range(len(logs)) if i not in {*numbers, *spare})
-            if not lost:
+    if known is not None:
+        return _Growing(logs, config, *known).grow()
+    found = list[MergedLandmarks]()
+    left = {i for i in range(len(logs)) if i not in spare}
+    while left and len(left) > max((_size(one, spare) for one in found), default=0):
+        first = min(left, key=lambda i: (-int(_firm(logs[i]).sum()), i))
+        found.append(_Growing(logs, config, logs[first].class_ids, logs[first].positions_xy, first).grow())
+        left.difference_update(found[-1].order)
+    return max(found, key=lambda one: _size(one, spare))
+
+
+def _size(group: MergedLandmarks, spare: Collection[int]) -> int:
+    """How many logs count in a group."""
+    return len({*group.order}.difference(spare))
+
+
+class _Growing:
+    """Landmarks (G,), (G, 2) that logs are laid on; those of the log `first` are there."""
+
+    def __init__(
+        self,
+        logs: Sequence[Submap],
+        config: BuildMapConfig,
+        class_ids: Ints,
+        positions: Array,
+        first: int | None = None,
+    ) -> None:
+        self._logs, self._config = logs, config
+        self._class_ids, self._positions = class_ids, positions
+        self._numbers = {} if first is None else {first: np.arange(len(class_ids))}
+
+    def grow(self) -> MergedLandmarks:
+        """Lay on it whatever can be."""
+        reasons = dict[int, str]()
+        while left := [i for i in range(len(self._logs)) if i not in self._numbers]:
+            found = {i: self._fit(i) for i in left}
+            poses = [(-one.common, i, one.pose) for i, one in found.items() if one.pose is not None]
+            if not poses:
+                reasons = {i: one.reason for i, one in found.items()}
                 break
-            raise MapError(
-                f"log {lost} cannot be laid on the rest of the map: too few landmarks in common, or several ways fit; "
-                "map it on its own, or add a log that overlaps with both"
-            )
-    return MergedLandmarks(class_ids, positions, tuple(numbers.get(i) for i in range(len(logs))))
+            most = min(common for common, _, _ in poses)
+            for common, i, pose in sorted(poses, key=itemgetter(0, 1)):
+                if common <= _STRONG * most:
+                    self._lay(i, pose)
+        of_log = tuple(self._numbers.get(i) for i in range(len(self._logs)))
+        return MergedLandmarks(self._class_ids, self._positions, of_log, tuple(self._numbers), reasons)
+
+    def _fit(self, i: int) -> Alignment:
+        """Where a log lies."""
+        log, firm = self._logs[i], _firm(self._logs[i])
+        return align_maps(log.class_ids[firm], log.positions_xy[firm], self._class_ids, self._positions, self._config)
+
+    def _lay(self, i: int, pose: Array) -> None:
+        """Number the landmarks of a log where it lies; new ones come after those that are there."""
+        own = self._logs[i]
+        there = transform_points(pose, own.positions_xy)
+        reach_m = _SAME_TOLERANCES * self._config.join_tolerance_m
+        self._numbers[i] = _match(own.class_ids, there, self._class_ids, self._positions, reach_m)
+        new = self._numbers[i] >= len(self._class_ids)
+        self._class_ids = np.concatenate([self._class_ids, own.class_ids[new]])
+        self._positions = np.concatenate([self._positions, there[new]])
+
+
+def _firm(log: Submap) -> NDArray[np.bool_]:
+    """Which landmarks (L,) of a log say where it lies."""
+    observations = np.bincount(log.landmark[log.landmark >= 0], minlength=len(log.class_ids))
+    firm: NDArray[np.bool_] = observations >= min(_FIRM, observations.max(initial=0))
+    return firm
 
 
 def _match(class_ids: Ints, positions: Array, map_class_ids: Ints, map_xy: Array, reach_m: float) -> Ints:

@@ -55,7 +55,7 @@ def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
         if run is None:
             run = _build(plan, parts, watch)
         written = [write_log(plan, log, one, parts, watch) for log, one in zip(plan.logs, run.logs, strict=True)]
-    return replace(run, logs=tuple(written))
+    return replace(run, logs=tuple(written)).as_named([request.recording for request in task.requests])
 
 
 def build_map_of(
@@ -94,10 +94,10 @@ def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
     logs = [mapped for mapped, _, _ in seen]
     with watch("solve", None, "steps"):
         built = _solve(plan, logs, [observations for _, observations, _ in seen])
-    landmark_map, trajectories, termination, left_out = built
-    logs = [_told(log, count) for log, count in zip(logs, left_out or (0,) * len(logs), strict=True)]
-    for log, trajectory, (_, _, shifts_ns) in zip(plan.logs, trajectories, seen, strict=True):
-        if log.request.recording in plan.task.outputs:
+    landmark_map, termination = built.landmark_map, built.termination
+    logs = [_told(log, built, i) for i, log in enumerate(logs)]
+    for log, trajectory, (_, _, shifts_ns) in zip(plan.logs, built.trajectories, seen, strict=True):
+        if trajectory is not None and log.request.recording in plan.task.outputs:
             write_part(plan, log, landmark_map, trajectory_as_stamped(trajectory, shifts_ns), parts)
     others = sum(stage.seconds or 0.0 for log in logs for stage in log.stages)
     seconds = time.perf_counter() - began - others
@@ -109,8 +109,10 @@ def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
     return run
 
 
-def _told(log: MappedLog, left_out: int) -> MappedLog:
-    """A log with the number of its bundles that the map had to leave out."""
+def _told(log: MappedLog, built: BuiltMap, row: int) -> MappedLog:
+    """A log with the number of its bundles that the map had to leave out, or why it left out all of it."""
+    log = replace(log, excluded=built.excluded.get(row, ""))
+    left_out = built.left_out[row] if built.left_out else 0
     if not left_out:
         return log
     dropped = {

@@ -48,7 +48,10 @@ class MapTask:
 
 @dataclass(frozen=True, slots=True)
 class LogPlan:
-    """One log on its way: its place among the logs, its steps up to the scene objects, what the map will read of it."""
+    """One log on its way: its place among the logs, its steps up to the scene objects, what the map will read of it.
+
+    The places follow the fingerprints, so that the map is the same in whatever order the logs are named.
+    """
 
     place: str
     request: Request
@@ -79,15 +82,15 @@ def plan_map(task: MapTask, parts: Path) -> MapPlan:
         UsageError: a recording is named twice, or a setting or file is wrong.
     """
     config = load(STAGE.name, task.requests[0].settings)
-    logs = tuple(
-        _plan_log(f"log {number}", config, request, task, parts) for number, request in enumerate(task.requests, 1)
-    )
-    _check_each_once(logs)
+    planned = [_plan_log(config, request, task, parts) for request in task.requests]
+    _check_each_once(planned)
+    planned.sort(key=lambda log: log.fingerprint)
+    logs = tuple(replace(log, place=f"log {number}") for number, log in enumerate(planned, 1))
     inputs = {log.place: log.record.key for log in logs}
     return MapPlan(task, config, logs, record_of(STAGE, config, task.files, inputs, {}))
 
 
-def _plan_log(place: str, config: Config, request: Request, task: MapTask, parts: Path) -> LogPlan:
+def _plan_log(config: Config, request: Request, task: MapTask, parts: Path) -> LogPlan:
     with open_session(request, parts, None) as session:
         log, choice = session.log, session.request.span.choice
         sensed = [channel for channel in STAGE.required if not is_result(channel, choice)]
@@ -98,7 +101,7 @@ def _plan_log(place: str, config: Config, request: Request, task: MapTask, parts
         refuse_clocks(session, steps)
         inputs, options = inputs_of_stage(STAGE, log, steps), choice_options(choice, STAGE.reads)
         record = record_of(STAGE, config, {**task.files, **frame_files(STAGE, request)}, inputs, options)
-        return LogPlan(place, session.request, log.recording.fingerprint(), steps, record)
+        return LogPlan("", session.request, log.recording.fingerprint(), steps, record)
 
 
 def _check_each_once(logs: Sequence[LogPlan]) -> None:

@@ -1,7 +1,7 @@
 """What became of a landmark map: found again where it was built before, and written to the logs that it is made of."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -28,23 +28,32 @@ VERB = "map"
 """What the manifests of a map and of its logs call what made them."""
 _LOGS = "logs"
 """The manifest's option with what came of each log: of the stages before, then of the map."""
+_EXCLUDED = "excluded"
+"""The manifest's option with the logs that are no part of the map, by fingerprint, and why."""
 _SOLVER = "solver"
 """The manifest's option with how the solver ended."""
 
 
 @dataclass(frozen=True, slots=True)
 class MappedLog:
-    """What became of one log on its way into a map; `outcome` counts its bundles and all that was lost."""
+    """What became of one log on its way into a map; `outcome` counts its bundles and all that was lost.
+
+    `excluded` says why it is no part of the map; empty if it is.
+    """
 
     recording: Location
     fingerprint: str
     stages: tuple[StageRun, ...]
     outcome: Outcome
+    excluded: str = ""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
 class MapRun:
-    """The map, what became of it and of each log, and how the solver ended; None where the method solves nothing."""
+    """The map, what became of it and of each log, and how the solver ended; None where the method solves nothing.
+
+    The logs come in the order in which they were named.
+    """
 
     landmark_map: LandmarkMap
     build: StageRun
@@ -61,13 +70,24 @@ class MapRun:
 
     @property
     def sources(self) -> tuple[MapSource, ...]:
-        """What the map says of the logs, in their order."""
-        return self.landmark_map.sources[len(self.landmark_map.sources) - len(self.logs) :]
+        """What the map says of the logs, in their order; of one that is no part of it no bundle was used."""
+        told = {source.fingerprint: source for source in self.landmark_map.sources}
+        return tuple(
+            MapSource("recording", log.fingerprint, log.outcome.bundles, 0) if log.excluded else told[log.fingerprint]
+            for log in self.logs
+        )
+
+    def as_named(self, recordings: Sequence[Location]) -> "MapRun":
+        """The run with its logs in the order of these recordings."""
+        logs = {log.recording: log for log in self.logs}
+        return replace(self, logs=tuple(logs[recording] for recording in recordings))
 
     def options(self) -> dict[str, object]:
         """What the manifest keeps of the run, so that `earlier_run` finds it again."""
         logs = [[*(run.outcome.entry() for run in log.stages), log.outcome.entry()] for log in self.logs]
-        return {_LOGS: logs, _SOLVER: asdict(self.termination) if self.termination else None}
+        excluded = {log.fingerprint: log.excluded for log in self.logs if log.excluded}
+        told: dict[str, object] = {_LOGS: logs, _SOLVER: asdict(self.termination) if self.termination else None}
+        return {**told, _EXCLUDED: excluded} if excluded else told
 
 
 def earlier_run(plan: MapPlan, parts: Path) -> MapRun | None:
@@ -75,20 +95,16 @@ def earlier_run(plan: MapPlan, parts: Path) -> MapRun | None:
     entries = read_manifest(plan.task.database)
     if _difference(entries, plan):
         return None
-    for log in plan.logs:
-        output = plan.task.outputs.get(log.request.recording)
-        if output is not None:
-            with open_session(log.request, parts, output) as session:
-                if session.find(plan.share(log)) is None:
-                    return None
     reason = "the map was made from the same logs, files and settings"
     logs = []
     try:
         options = json.loads(entries["options"])
+        excluded = options.get(_EXCLUDED, {})
         for log, (*before, own) in zip(plan.logs, options[_LOGS], strict=True):
             outcomes = zip(log.steps, before, strict=True)
             stages = tuple(StageRun(step.stage.name, "reused", reason, Outcome.of(told)) for step, told in outcomes)
-            logs.append(MappedLog(log.request.recording, log.fingerprint, stages, Outcome.of(own)))
+            why = str(excluded.get(log.fingerprint, ""))
+            logs.append(MappedLog(log.request.recording, log.fingerprint, stages, Outcome.of(own), why))
         termination = Termination(**options[_SOLVER]) if options[_SOLVER] else None
     except (
         ValueError,
@@ -98,8 +114,19 @@ def earlier_run(plan: MapPlan, parts: Path) -> MapRun | None:
         RecursionError,
     ):  # damaged: nothing of it can be told again
         return None
+    if not all(_is_written(plan, log, parts) for log, one in zip(plan.logs, logs, strict=True) if not one.excluded):
+        return None
     build = StageRun(plan.record.stage, "reused", reason, build_outcome(plan, termination))
     return MapRun(read_map(plan.task.database), build, tuple(logs), termination)
+
+
+def _is_written(plan: MapPlan, log: LogPlan, parts: Path) -> bool:
+    """Whether the output of a log, if it has one, holds its results of the map."""
+    output = plan.task.outputs.get(log.request.recording)
+    if output is None:
+        return True
+    with open_session(log.request, parts, output) as session:
+        return session.find(plan.share(log)) is not None
 
 
 def build_outcome(plan: MapPlan, termination: Termination | None) -> Outcome:
@@ -154,7 +181,8 @@ def write_log(plan: MapPlan, log: LogPlan, mapped: MappedLog, parts: Path, watch
         for step in log.steps:
             if session.find(step.record) is None:
                 session.work(step, watch)
-        session.find(plan.share(log))
+        if not mapped.excluded:
+            session.find(plan.share(log))
         notes, losses = write_output(session, output, VERB, [other.fingerprint for other in plan.logs], watch)
     all_notes, all_losses = told([StageRun(plan.record.stage, "", "", outcome)], notes, losses)
     return replace(mapped, outcome=replace(outcome, notes=all_notes, losses=all_losses))
