@@ -2,7 +2,6 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,18 +85,21 @@ class _Growing:
     def grow(self) -> MergedLandmarks:
         """Lay on it whatever can be."""
         reasons = dict[int, str]()
-        while left := [i for i in range(len(self._logs)) if i not in self._numbers]:
+        while not reasons and (left := [i for i in range(len(self._logs)) if i not in self._numbers]):
             found = {i: self._fit(i) for i in left}
-            poses = [(-one.common, i, one.pose) for i, one in found.items() if one.pose is not None]
-            if not poses:
+            if not self._lay_strong(found):
                 reasons = {i: one.reason for i, one in found.items()}
-                break
-            most = min(common for common, _, _ in poses)
-            for common, i, pose in sorted(poses, key=itemgetter(0, 1)):
-                if common <= _STRONG * most:
-                    self._lay(i, pose)
         of_log = tuple(self._numbers.get(i) for i in range(len(self._logs)))
         return MergedLandmarks(self._class_ids, self._positions, of_log, tuple(self._numbers), reasons)
+
+    def _lay_strong(self, found: Mapping[int, Alignment]) -> bool:
+        """Lay the logs with most in common where they were found to lie; False if none was."""
+        poses = sorted((-one.common, i) for i, one in found.items() if one.pose is not None)
+        for common, i in poses:
+            pose = found[i].pose
+            if pose is not None and common <= _STRONG * poses[0][0]:
+                self._lay(i, pose)
+        return bool(poses)
 
     def _fit(self, i: int) -> Alignment:
         """Where a log lies."""
