@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from mcap_landmarks.errors import ToolkitError
@@ -13,7 +14,9 @@ from mcap_landmarks_generator.groups import arrange
 from mcap_landmarks_generator.layout import PlacedObject, built, place
 from mcap_landmarks_generator.loading import LoadedScenario
 from mcap_landmarks_generator.scenario import Scenario
+from mcap_landmarks_generator.sdf_world import read_world
 from mcap_landmarks_generator.toml_lines import KeyPath
+from mcap_landmarks_generator.world_objects import objects_of
 
 Floats = NDArray[np.float64]
 
@@ -24,23 +27,31 @@ WALKER_RADIUS_M = 0.3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Staged:
-    """A scenario that can be run: its groups arranged, its objects built, its start known (x, y, heading)."""
+    """A scenario that can be run: its groups arranged, its objects built, its start known (x, y, heading).
+
+    `warnings` say what of a world in SDF is not as it is there.
+    """
 
     name: str
     scenario: Scenario
     objects: tuple[PlacedObject, ...]
     start: Floats
+    warnings: tuple[str, ...] = ()
 
 
 def stage(loaded: LoadedScenario) -> Staged:
     """Arrange and build a scenario, and refuse what cannot be.
 
     Raises:
-        ToolkitError: an unknown variant, objects inside each other, a start inside an object, a waypoint that the
-            robot cannot reach straight from the one before; the message names the line.
+        ToolkitError: a world that cannot be read, an unknown variant, objects inside each other, a start inside an
+            object, a waypoint that the robot cannot reach straight from the one before; the message names the line.
     """
     scenario = loaded.scenario
-    _check_variants(loaded)
+    warnings: list[str] = []
+    if scenario.world is not None:
+        objects, warnings = objects_of(read_world(Path(scenario.world.file)), scenario.world.classes)
+        scenario = replace(scenario, objects=objects, groups=None, world=None)
+    _check_variants(loaded, scenario)
     if scenario.groups is not None:
         if scenario.trajectory.waypoints:
             raise loaded.fault(("trajectory", "waypoints"), "groups bring a way of their own; remove one of the two")
@@ -53,7 +64,7 @@ def stage(loaded: LoadedScenario) -> Staged:
         )
     placed = place(scenario.objects)
     _check_objects(loaded, placed)
-    staged = Staged(loaded.name, scenario, placed, start_pose(scenario))
+    staged = Staged(loaded.name, scenario, placed, start_pose(scenario), tuple(warnings))
     _check_way(loaded, staged)
     return staged
 
@@ -73,8 +84,8 @@ def start_pose(scenario: Scenario) -> Floats:
     return np.array([*first.at, np.arctan2(ahead[1], ahead[0])])
 
 
-def _check_variants(loaded: LoadedScenario) -> None:
-    for i, spec in enumerate(loaded.scenario.objects):
+def _check_variants(loaded: LoadedScenario, scenario: Scenario) -> None:
+    for i, spec in enumerate(scenario.objects):
         try:
             built(spec.class_name, spec.variant, spec.look)
         except ToolkitError as error:

@@ -70,6 +70,9 @@ def _read(path: Path, above: tuple[Path, ...]) -> tuple[dict[str, object], dict[
     except (OSError, ValueError, RecursionError) as error:
         raise ToolkitError(f"{path}: not a TOML file: {error}") from error
     origins = {key_path: f"{path}:{line}" for key_path, line in lines_of(text).items()}
+    world = content.get("world")
+    if isinstance(world, dict) and isinstance(world.get("file"), str):
+        world["file"] = str(path.parent / world["file"])
     base_name = content.pop("extends", None)
     if base_name is None:
         return content, origins

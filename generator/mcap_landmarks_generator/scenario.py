@@ -36,6 +36,7 @@ def _among(names: tuple[str, ...]) -> Callable[[str], str]:
 
 
 _OBJECTS = catalog.CLASSES + catalog.DISTRACTORS
+StandIn = Annotated[str, AfterValidator(_among(("", *_OBJECTS))), Field(json_schema_extra={"enum": ["", *_OBJECTS]})]
 ClassName = Annotated[str, AfterValidator(_among(_OBJECTS)), Field(json_schema_extra={"enum": list(_OBJECTS)})]
 Ground = Annotated[str, AfterValidator(_among(ground.KINDS)), Field(json_schema_extra={"enum": list(ground.KINDS)})]
 Sky = Annotated[str, AfterValidator(_among(sky.KINDS)), Field(json_schema_extra={"enum": list(sky.KINDS)})]
@@ -83,6 +84,18 @@ class GroupsSpec:
     """Radius of a group; its objects keep 1.2 m apart."""
     looks: Annotated[int, Field(ge=1)] = 6
     """How many different looks a class has."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldSpec:
+    """A world in SDF (Gazebo's format) whose models become the objects."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
+
+    file: str
+    """The world's file, beside this one."""
+    classes: dict[str, StandIn] = field(default_factory=dict)
+    """Class or distractor of models by pattern of their names or URIs, such as "shelf_*"; empty leaves them out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,6 +209,8 @@ class Scenario:
     """The objects of the world."""
     groups: GroupsSpec | None = None
     """Groups of objects at random places, beside `objects`; their way stands in for `trajectory.waypoints`."""
+    world: WorldSpec | None = None
+    """A world in SDF, whose models stand in for `objects` and `groups`."""
     ground: GroundSpec = field(default_factory=GroundSpec)
     background: BackgroundSpec = field(default_factory=BackgroundSpec)
     light: LightSpec = field(default_factory=LightSpec)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mcap_landmarks.atomic import check_target
-from mcap_landmarks.cli import options
+from mcap_landmarks.cli import options, scenarios
 from mcap_landmarks.cli.console import progress, say, say_json, table, warn
-from mcap_landmarks.errors import ToolkitError, UsageError
+from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
 from mcap_landmarks.wording import counted
 
@@ -25,13 +25,10 @@ def command(
     output: Annotated[
         Location | None, typer.Option("-o", "--output", parser=location, help="Recording to write (MCAP).")
     ] = None,
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed instead of the scenario's.")] = None,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="One value of the scenario; repeatable.")
-    ] = None,
-    workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Processes that render; as many as cores by default.")
-    ] = None,
+    world: scenarios.World = None,
+    seed: scenarios.Seed = None,
+    settings: scenarios.Values = None,
+    workers: scenarios.Workers = None,
     overwrite: options.Overwrite = False,
     list_scenarios: Annotated[bool, typer.Option("--list", help="List the bundled scenarios and exit.")] = False,
     json: options.Json = False,
@@ -50,16 +47,11 @@ def command(
     from mcap_landmarks.runs.replacing import check_apart, generated_recording, output_to
 
     target = check_target(output)
-    check_apart([target], [file for file in [Path(scenario)] if file.is_file()])
-    try:
-        from mcap_landmarks_generator.checks import stage
-        from mcap_landmarks_generator.loading import load_scenario
-        from mcap_landmarks_generator.record import manifest, record
-        from mcap_landmarks_generator.trajectory import expected_duration_s
-    except ModuleNotFoundError as error:
-        raise ToolkitError(f"{error.name} is not installed: pip install 'mcap-landmarks[generator]'") from error
+    check_apart([target], [file for file in [Path(scenario), world] if file is not None and not _is_missing(file)])
+    staged = scenarios.staged_scenario(scenario, world, settings or [], seed)
+    from mcap_landmarks_generator.record import manifest, record
+    from mcap_landmarks_generator.trajectory import expected_duration_s
 
-    staged = stage(load_scenario(scenario, settings or [], seed))
     way, factor = staged.scenario.trajectory, staged.scenario.robot.speed_factor
     seconds = round(expected_duration_s(way, staged.start, factor))
     earlier = generated_recording(manifest(staged).entries())
@@ -74,6 +66,10 @@ def command(
         say_json("generate", _document(staged, target, summary))
     else:
         _print(target, summary)
+
+
+def _is_missing(place: Location) -> bool:
+    return isinstance(place, Path) and not place.is_file()
 
 
 def _list(json: bool) -> None:

@@ -21,6 +21,7 @@ _NOT_VERBS = {
     "console",
     "option_groups",
     "options",
+    "scenarios",
     "stage_runs",
     "terminal",
     "conversion_options",

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mcap_landmarks.cli import options
+from mcap_landmarks.cli import options, scenarios
 from mcap_landmarks.cli.console import say, warn
 from mcap_landmarks.cli.terminal import check_terminal, open_terminal
-from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.locations import Location, location
 from mcap_landmarks.wording import counted
 
@@ -24,19 +23,16 @@ if TYPE_CHECKING:
 def command(
     scenario: Annotated[str, typer.Argument(metavar="SCENARIO", help="Name of a bundled scenario, or a TOML file.")],
     output: Annotated[Location, typer.Option("-o", "--output", parser=location, help="Recording to write (MCAP).")],
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Seed instead of the scenario's.")] = None,
-    settings: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="One value of the scenario; repeatable.")
-    ] = None,
+    world: scenarios.World = None,
+    seed: scenarios.Seed = None,
+    settings: scenarios.Values = None,
     model: Annotated[
         Location | None,
         typer.Option(
             "--model", metavar="FILE|NAME", parser=location, help="Detector whose finds are shown; `bundled` is there."
         ),
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option("--workers", min=1, help="Processes that render; as many as cores by default.")
-    ] = None,
+    workers: scenarios.Workers = None,
     overwrite: options.Overwrite = False,
 ) -> None:
     """Drive the robot of SCENARIO through its world with w, x, a, d, s and q, and record what its sensors see.
@@ -47,17 +43,12 @@ def command(
     from mcap_landmarks.runs.replacing import new_files
 
     target, look = check_target(output), _look_with(model)
-    try:
-        from mcap_landmarks_generator.checks import stage
-        from mcap_landmarks_generator.cockpit import Cockpit
-        from mcap_landmarks_generator.loading import load_scenario
-        from mcap_landmarks_generator.record import record
-    except ModuleNotFoundError as error:
-        raise ToolkitError(f"{error.name} is not installed: pip install 'mcap-landmarks[generator]'") from error
-
-    with new_files([target], [], overwrite=overwrite):
+    with new_files([target], [world], overwrite=overwrite):
         check_terminal()
-        staged = stage(load_scenario(scenario, settings or [], seed))
+        staged = scenarios.staged_scenario(scenario, world, settings or [], seed)
+        from mcap_landmarks_generator.cockpit import Cockpit
+        from mcap_landmarks_generator.record import record
+
         with open_terminal() as terminal:
             cockpit = Cockpit(staged, terminal, f"{staged.name} -> {target.name}", look)
             summary = record(staged, target, workers or os.cpu_count() or 1, by_hand=cockpit)

@@ -1,0 +1,121 @@
+"""Objects of a scenario from the models of an SDF world: which class each is of, and what stands for those of none."""
+
+import re
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from mcap_landmarks_generator import footprints
+from mcap_landmarks_generator.assets import catalog
+from mcap_landmarks_generator.layout import place
+from mcap_landmarks_generator.scenario import ObjectSpec
+from mcap_landmarks_generator.sdf_world import SdfModel
+
+_BY_WORD = {
+    "barrier": "box", "bike": "bicycle", "cardboard": "box", "casual": "person", "crate": "box", "cube": "box",
+    "drum": "barrel", "hatchback": "car", "hydrant": "fire hydrant", "lamp": "pole", "light": "pole", "oak": "tree",
+    "pallet": "box", "pedestrian": "person", "pickup": "car", "pine": "tree", "plant": "potted plant", "post": "pole",
+    "prius": "car", "shelf": "box", "suv": "car", "trash": "barrel", "visitor": "person", "walker": "person",
+}  # fmt: skip
+"""Words in the names of models of Gazebo's public collections that are no names of classes here."""
+_NO_OBJECTS = {"sun", "ground plane", "asphalt plane", "ground", "floor"}
+_SPEED_MPS = 1.2
+"""Of one who walks in no time, as a script without times has it."""
+
+
+def objects_of(models: Sequence[SdfModel], classes: Mapping[str, str]) -> tuple[tuple[ObjectSpec, ...], list[str]]:
+    """The objects that models become, and warnings of what is not as in the world.
+
+    `classes` are classes or distractors by pattern of names (`*` is any text); an empty one leaves the model out. Where
+    no pattern fits, words of the name decide. What is of no class stands as a distractor of about its shape, unless it
+    would stand inside another object.
+    """
+    objects: list[ObjectSpec] = []
+    stand_ins: list[tuple[str, ObjectSpec]] = []
+    for number, model in enumerate(models):
+        found = _class_of(model, classes)
+        if found == "" or (not found and model.solid == "plane"):
+            continue
+        spec = _spec(model, found or _by_shape(model), look=number)
+        if found:
+            objects.append(spec)
+        else:
+            stand_ins.append((model.name, spec))
+    kept, inside = _apart(objects, stand_ins)
+    warnings = []
+    if stand_ins:
+        warnings.append(
+            f"{_named([name for name, _ in stand_ins])}: of no class, so that they stand as distractors; name their "
+            'classes in the scenario, as in [world] classes = { "shelf_*" = "box" }'
+        )
+    if inside:
+        warnings.append(f"{_named(inside)}: left out, since what stands for them would be inside another object")
+    return (*objects, *kept), warnings
+
+
+def _class_of(model: SdfModel, classes: Mapping[str, str]) -> str | None:
+    """A class or distractor; empty for what is no object, None for what is of no class."""
+    names = [name.lower() for name in (model.name, model.uri) if name]
+    for pattern, class_name in classes.items():
+        if any(fnmatchcase(name, pattern.lower()) for name in names):
+            return class_name
+    told = [_told_by(re.sub(r"[^a-z]+", " ", name).split()) for name in names]
+    return next((class_name for class_name in told if class_name is not None), None)
+
+
+def _told_by(words: Sequence[str]) -> str | None:
+    """What the words of a name say, as `_class_of` tells it; of two classes in a name the longer one is meant."""
+    name = " ".join(words)
+    if name in _NO_OBJECTS:
+        return ""
+    known = [one for one in (*catalog.CLASSES, *catalog.DISTRACTORS) if f" {one} " in f" {name} "]
+    if known:
+        return max(known, key=len)
+    return next((_BY_WORD[word] for word in words if word in _BY_WORD), None)
+
+
+def _by_shape(model: SdfModel) -> str:
+    """The distractor that is most like a model's collision shape."""
+    if model.solid != "cylinder" or len(model.size_m) != 2:
+        return "box"
+    radius_m, length_m = model.size_m
+    if radius_m > 0.15:
+        return "barrel"
+    return "pole" if length_m > 1.5 else "bollard"
+
+
+def _spec(model: SdfModel, class_name: str, look: int) -> ObjectSpec:
+    x, y = model.world_from_model[:2, 3]
+    ways = np.vstack([[[x, y]], model.way_xy])
+    length_m = float(np.hypot(*np.diff(ways, axis=0).T).sum())
+    speed = length_m / model.walks_s if model.walks_s > 0 and length_m else _SPEED_MPS
+    return ObjectSpec(
+        class_name=class_name,
+        at=(round(float(x), 3), round(float(y), 3)),
+        yaw_deg=round(float(np.rad2deg(model.heading_rad)), 1),
+        look=look,
+        walk=tuple((round(float(px), 3), round(float(py), 3)) for px, py in model.way_xy),
+        speed_mps=round(speed, 3),
+    )
+
+
+def _apart(
+    objects: Sequence[ObjectSpec], stand_ins: Sequence[tuple[str, ObjectSpec]]
+) -> tuple[list[ObjectSpec], list[str]]:
+    """The stand-ins that are not inside an object or one another, and the names of the others."""
+    standing = list(place(tuple(objects)))
+    kept, inside = [], []
+    for name, spec in stand_ins:
+        (placed,) = place((spec,))
+        if any(footprints.overlap(placed, other) for other in standing):
+            inside.append(name)
+        else:
+            standing.append(placed)
+            kept.append(spec)
+    return kept, inside
+
+
+def _named(names: Sequence[str]) -> str:
+    shown = ", ".join(names[:5])
+    return f"{shown} and {len(names) - 5} more" if len(names) > 5 else shown
