@@ -8,7 +8,7 @@ from mcap_landmarks.geometry.angles import wrap
 from mcap_landmarks.messages.images import CameraInfo
 from numpy.typing import NDArray
 
-from mcap_landmarks_generator.clock import measurement_times, to_ns
+from mcap_landmarks_generator.clock import Delivered, Delivery, measurement_times
 from mcap_landmarks_generator.history import History, rotate
 from mcap_landmarks_generator.odometry import true_poses
 from mcap_landmarks_generator.randomness import Stream, draws
@@ -83,8 +83,9 @@ class Camera:
     """The images of one simulated recording that are to be rendered, in order."""
 
     def __init__(self, spec: CameraSpec, seed: int, start_ns: int) -> None:
-        self._spec, self._start_ns = spec, start_ns
+        self._spec = spec
         self._times = measurement_times(spec, draws(seed, Stream.CAMERA_CLOCK))
+        self._delivery = Delivery(spec, seed, Stream.CAMERA_DELIVERY, start_ns)
         self._next_ns = next(self._times)
         self._index = 0
 
@@ -92,21 +93,22 @@ class Camera:
         """The images whose time lies in the past."""
         while self._next_ns <= history.end_ns:
             if self._spec.when == "always" or (self._spec.when == "stops" and history.standing(self._next_ns)):
-                yield self._job(history, self._next_ns)
+                delivered = self._delivery.of(self._next_ns)
+                if delivered is not None:
+                    yield self._job(history, self._next_ns, delivered)
                 self._index += 1
             self._next_ns = next(self._times)
 
-    def _job(self, history: History, time_ns: int) -> ImageJob:
+    def _job(self, history: History, time_ns: int, delivered: Delivered) -> ImageJob:
         at_ns = np.array([time_ns])
         orientation = history.orientations(at_ns)
         world_from_base = rotate(np.repeat(orientation, 3, axis=0), np.eye(3)).T
         before, now = true_poses(history, np.array([max(0, time_ns - _TURN_OVER_NS), time_ns]))[:, 2]
-        stamp_ns = self._start_ns + time_ns + to_ns(self._spec.latency_s)
         eye = history.positions(at_ns)[0] + world_from_base @ CAMERA_IN_BASE_M
         return ImageJob(
             index=self._index,
-            stamp_ns=stamp_ns,
-            log_time_ns=stamp_ns + to_ns(self._spec.delay_s),
+            stamp_ns=delivered.stamp_ns,
+            log_time_ns=delivered.log_time_ns,
             view=Viewpoint(eye, world_from_base @ BASE_FROM_OPTICAL, time_ns / 1e9),
             turn_radps=float(wrap(now - before)) / (_TURN_OVER_NS / 1e9),
         )

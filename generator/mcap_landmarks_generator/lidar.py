@@ -8,7 +8,7 @@ from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.stage import Stamped
 from numpy.typing import NDArray
 
-from mcap_landmarks_generator.clock import measurement_times, to_ns
+from mcap_landmarks_generator.clock import Delivery, measurement_times, to_ns
 from mcap_landmarks_generator.history import History, rotate
 from mcap_landmarks_generator.randomness import Stream, draws
 from mcap_landmarks_generator.robot import SCAN_FRAME, SCAN_IN_BASE_M
@@ -27,7 +27,8 @@ class Lidar:
     """Scans of one simulated recording, in order."""
 
     def __init__(self, spec: LidarSpec, seed: int, start_ns: int) -> None:
-        self._spec, self._seed, self._start_ns = spec, seed, start_ns
+        self._spec, self._seed = spec, seed
+        self._delivery = Delivery(spec, seed, Stream.LIDAR_DELIVERY, start_ns)
         self._times = measurement_times(spec, draws(seed, Stream.LIDAR_CLOCK))
         self._next_ns = next(self._times)
         self._index = 0
@@ -37,12 +38,11 @@ class Lidar:
     def measure(self, history: History, world: World) -> Iterator[Stamped]:
         """The scans whose last beam lies in the past."""
         while self._next_ns + self._period_ns <= history.end_ns:
-            first_ns = self._next_ns
-            distances = cast(world, history, self._spec, first_ns + self._beam_ns)
-            ranges = noisy(distances, self._spec, draws(self._seed, Stream.SCAN, self._index))
-            stamp_ns = self._start_ns + first_ns + to_ns(self._spec.latency_s)
-            log_ns = stamp_ns + self._period_ns + to_ns(self._spec.delay_s)
-            yield Stamped(SCAN, log_ns, self._message(stamp_ns, ranges))
+            delivered = self._delivery.of(self._next_ns, self._period_ns)
+            if delivered is not None:
+                distances = cast(world, history, self._spec, self._next_ns + self._beam_ns)
+                ranges = noisy(distances, self._spec, draws(self._seed, Stream.SCAN, self._index))
+                yield Stamped(SCAN, delivered.log_time_ns, self._message(delivered.stamp_ns, ranges))
             self._index += 1
             self._next_ns = next(self._times)
 

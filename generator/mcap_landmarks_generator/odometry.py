@@ -11,7 +11,7 @@ from mcap_landmarks.messages.transforms import TFMessage, Transform
 from mcap_landmarks.stage import Stamped
 from numpy.typing import NDArray
 
-from mcap_landmarks_generator.clock import measurement_times, to_ns
+from mcap_landmarks_generator.clock import Delivery, measurement_times
 from mcap_landmarks_generator.history import History
 from mcap_landmarks_generator.randomness import Stream, draws
 from mcap_landmarks_generator.robot import WHEEL_DISTANCE_M, WHEEL_RADIUS_M
@@ -62,7 +62,8 @@ class OdometrySensor:
     """Odometry messages and transforms of one simulated recording, in order."""
 
     def __init__(self, spec: OdometrySpec, seed: int, start_ns: int) -> None:
-        self._spec, self._start_ns = spec, start_ns
+        self._spec = spec
+        self._delivery = Delivery(spec, seed, Stream.ODOMETRY_DELIVERY, start_ns)
         self._times = measurement_times(spec, draws(seed, Stream.ODOMETRY_CLOCK))
         self._next_ns = next(self._times)
         self._last_ns = self._next_ns
@@ -79,10 +80,11 @@ class OdometrySensor:
             else:
                 self._wheels.update(history.wheels(at_ns)[0], period_s)
                 pose, covariance, speeds = self._wheels.pose, self._wheels.covariance, self._wheels.speeds
-            stamp_ns = self._start_ns + self._next_ns + to_ns(self._spec.latency_s)
-            log_ns = stamp_ns + to_ns(self._spec.delay_s)
-            yield Stamped(ODOMETRY, log_ns, Odometry.planar(stamp_ns, _FRAMES, pose, covariance, speeds))
-            yield Stamped(TF, log_ns, TFMessage((Transform.planar(stamp_ns, _FRAMES, pose),)))
+            delivered = self._delivery.of(self._next_ns)
+            if delivered is not None:
+                stamp_ns, log_ns = delivered
+                yield Stamped(ODOMETRY, log_ns, Odometry.planar(stamp_ns, _FRAMES, pose, covariance, speeds))
+                yield Stamped(TF, log_ns, TFMessage((Transform.planar(stamp_ns, _FRAMES, pose),)))
             self._last_ns = self._next_ns
             self._next_ns = next(self._times)
 

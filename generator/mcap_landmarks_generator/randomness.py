@@ -16,6 +16,9 @@ class Stream(IntEnum):
     SCAN = 6
     SLIP = 7
     IMAGE_NOISE = 8
+    CAMERA_DELIVERY = 9
+    LIDAR_DELIVERY = 10
+    ODOMETRY_DELIVERY = 11
 
 
 def draws(seed: int, stream: Stream, index: int = 0) -> np.random.Generator:

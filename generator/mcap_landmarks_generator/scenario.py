@@ -158,6 +158,8 @@ class RobotSpec:
     """x in m, y in m and heading in degrees at the start; on the first waypoint if left out."""
     speed_factor: Positive = 1.0
     """Multiplies the limits 0.26 m/s and 1.82 rad/s."""
+    frames_after_s: NotNegative = 0.0
+    """How long after the start its fixed frames are logged: latched messages may come late."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -27,7 +27,17 @@ class SensorSpec:
     latency_s: NotNegative = 0.0
     """The header's stamp is this much later than the measurement."""
     delay_s: NotNegative = 0.0
-    """The log time is this much later than the end of the measurement, stamped."""
+    """The log time is this much later than the end of the measurement and the latency."""
+    clock_offset_s: float = 0.0
+    """The clock of the header's stamp is this much ahead of the recorder's; negative if behind."""
+    clock_drift_ppm: Annotated[float, Field(gt=-1e5, lt=1e5)] = 0.0
+    """That clock gains this many millionths of the time since the start."""
+    dropped: Share = 0.0
+    """Share of messages that are lost."""
+    late: Share = 0.0
+    """Share of messages that are logged later than the others, behind newer ones."""
+    late_s: NotNegative = 0.5
+    """How much later these are."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

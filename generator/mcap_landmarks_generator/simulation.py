@@ -2,6 +2,7 @@
 
 import heapq
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 from mcap_landmarks.channels import BASE_FRAME, TF_STATIC
@@ -11,6 +12,7 @@ from mcap_landmarks.stage import Stamped
 
 from mcap_landmarks_generator.camera import Camera, ImageJob
 from mcap_landmarks_generator.checks import Staged
+from mcap_landmarks_generator.clock import to_ns
 from mcap_landmarks_generator.ground_truth import GroundTruth
 from mcap_landmarks_generator.history import History
 from mcap_landmarks_generator.lidar import Lidar
@@ -80,7 +82,8 @@ class Simulation:
         """Messages and jobs as they are measured, and None after each step of time."""
         staged, steering = self._staged, self._steering
         watch = _StuckWatch()
-        yield static_transforms(staged.scenario.start_ns)
+        frames = static_transforms(staged.scenario.start_ns)
+        yield replace(frames, log_time_ns=frames.log_time_ns + to_ns(staged.scenario.robot.frames_after_s))
         with World(staged.objects, staged.start) as world:
             standing, step = False, 0
             self._history.append(world.robot.state(), standing)
