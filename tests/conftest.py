@@ -1,5 +1,6 @@
 """Fixtures that every test may use."""
 
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import pytest
 from hypothesis import settings
 from mcap_landmarks.networks import cache
 
+from tests.remote.object_store import Bucket, new_bucket, serving_s3, use_server
 from tests.report import results
 from tests.shared import data_folder
 
@@ -68,3 +70,17 @@ def shared_data() -> Path:
 def whole_result(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log with images, scans and truth, and all that localize finds in it; only to be read."""
     return results.whole_result(tmp_path_factory.mktemp("whole") / "result.mcap")
+
+
+@pytest.fixture(scope="session")
+def s3_server() -> Iterator[str]:
+    """The address of a store that speaks S3."""
+    with serving_s3() as address:
+        yield address
+
+
+@pytest.fixture
+def bucket(s3_server: str, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Bucket:
+    """A bucket of the test's own, and credentials for it in the environment."""
+    use_server(s3_server, monkeypatch)
+    return new_bucket(f"b{zlib.crc32(request.node.nodeid.encode()):08x}")

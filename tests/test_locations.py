@@ -4,9 +4,8 @@ import pickle
 from pathlib import Path
 
 import pytest
-from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.locations import Url, is_folder, location, matching, size_of, to_read, to_write
+from mcap_landmarks.locations import Url, is_folder, location, matching, size_of, to_read
 
 URLS = ("https://host.example/logs/run.1.mcap?signature=a/b.c", "s3://bucket/run.1.mcap", "gs://b/a//run.1.mcap#x")
 
@@ -36,11 +35,21 @@ def test_a_file_url_is_a_path() -> None:
         location("file://host/a")
 
 
-@pytest.mark.parametrize("text", URLS)
-def test_nothing_is_written_there_yet(text: str) -> None:
-    with pytest.raises(UsageError) as error, atomic_file(url := location(text)):
-        pass
-    assert str(error.value) == f"{url}: URLs cannot be written yet; write to a file and upload that"
+@pytest.mark.parametrize("text", ["s3://bucket/out", "s3://bucket/out/"])
+def test_names_in_a_folder_and_beside_a_file(text: str) -> None:
+    assert location(text) / "a.mcap" == Url("s3://bucket/out/a.mcap")
+    assert location(text).with_name("b.mcap") == Url("s3://bucket/b.mcap")
+    assert (location("out") / "a.mcap").with_name("b.mcap") == Path("out/b.mcap")
+
+
+@pytest.mark.parametrize(
+    "text", ["s3://key:secret@bucket/a", "https://user:secret@host/a", "https://secret@host/a", "abfs://c:secret@h/a"]
+)
+def test_a_password_in_a_url_is_refused_and_not_shown(text: str) -> None:
+    with pytest.raises(UsageError, match="credentials come from the environment") as error:
+        location(text)
+    assert "secret" not in str(error.value)
+    assert location("abfs://container@account.example/a")
 
 
 def test_a_scheme_that_nobody_reads_says_which_are() -> None:
@@ -52,5 +61,5 @@ def test_a_scheme_that_nobody_reads_says_which_are() -> None:
 def test_paths_pass_and_have_sizes(tmp_path: Path) -> None:
     file = tmp_path / "a.txt"
     file.write_text("four")
-    assert to_read(file) is to_write(file) is file
+    assert to_read(file) is file
     assert [size_of(path) for path in (file, tmp_path, tmp_path / "missing")] == [4, 0, 0]

@@ -4,10 +4,10 @@ import importlib.metadata
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 from mcap_landmarks.errors import ToolkitError
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import GENERATE, RUN, Manifest
 from mcap_landmarks.recording.writer import create_recording
 from mcap_landmarks.stage import Stamped
@@ -47,7 +47,7 @@ class ByHand(Steering, Protocol):
 
 def record(
     staged: Staged,
-    path: Path,
+    path: Location,
     workers: int = 1,
     progress: Callable[[int], None] = lambda _: None,
     by_hand: ByHand | None = None,

@@ -1,4 +1,9 @@
-"""Output files and folders that appear whole or not at all, each written by one process at a time."""
+"""Output files and folders that appear whole or not at all, each written by one process at a time.
+
+An output elsewhere is made in the user's cache folder, and sent when it is whole; see `remote.uploads`. Its lock keeps
+other processes of this machine off: of two machines that write it, the one that is done last replaces what the other
+has written.
+"""
 
 import contextlib
 import errno
@@ -10,56 +15,64 @@ import shutil
 import stat
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 from mcap_landmarks.errors import RecordingError, UsageError
-from mcap_landmarks.locations import Location, to_write
+from mcap_landmarks.locations import Location, Url
+from mcap_landmarks.remote.staged_outputs import send_file, send_folder, staged_output
+from mcap_landmarks.remote.uploads import check_uploadable
 
+_L = TypeVar("_L", bound=Location)
 _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP}
 """What systems say whose files cannot be locked (flock(2), some network file systems)."""
 _held: set[Path] = set()
 """The targets that this process holds."""
 
 
-def check_target(target: Location, *, is_folder: bool = False) -> Path:
-    """The path of a target; refuses one that cannot become a regular file, or a folder. A link stands for its end.
+def check_target(target: _L, *, is_folder: bool = False) -> _L:
+    """The target; refuses one that cannot become a regular file, or a folder. A link stands for its end.
 
     Raises:
-        UsageError: it is not on this machine, its folder does not exist, or what has its name is something else.
+        UsageError: its folder does not exist, what has its name is something else, or nothing can be written there.
     """
-    path = to_write(target)
+    if isinstance(target, Url):
+        check_uploadable(target.text, is_folder=is_folder)
+        return target
+    path = _path(target)
     real = _real(path)
     if not real.parent.is_dir():
         raise UsageError(f"{path}: the folder {real.parent} does not exist; create it first")
     try:
         mode = real.lstat().st_mode
     except FileNotFoundError:
-        return path
+        return target
     except OSError as error:
         raise UsageError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
     if is_folder and not stat.S_ISDIR(mode):
         raise UsageError(f"{path} is not a folder; name one that may be written")
     if not is_folder and not stat.S_ISREG(mode):
         raise UsageError(f"{path} is not a regular file; name a file that may be written")
-    return path
+    return target
 
 
 @contextlib.contextmanager
 def held(target: Location, *, is_folder: bool = False) -> Iterator[Path]:
-    """Keep every other process from writing a target while the block runs; the path that it has behind links.
+    """Keep every other process from writing a target while the block runs; the path where it is made.
 
-    The lock ends with the process, however that ends. What a killed process left half written is removed.
+    That is the one behind links, and of a target elsewhere one in the cache folder. The lock ends with the process,
+    however that ends. What a killed process left half written is removed.
 
     Raises:
         UsageError: see `check_target`.
         RecordingError: another process holds it, the disk is full, or the folder may not be written.
     """
-    path = _real(check_target(target, is_folder=is_folder))
+    check_target(target, is_folder=is_folder)
+    path = staged_output(target.text) if isinstance(target, Url) else _real(_path(target))
     if path in _held:
         yield path
         return
     with _failing_as(target):
-        descriptor = _lock(path)
+        descriptor = _lock(path, makes_folder=isinstance(target, Url))
     if descriptor is None:
         raise RecordingError(f"{target}: another run writes to it; wait until that ends, or write to another file")
     _held.add(path)
@@ -72,6 +85,9 @@ def held(target: Location, *, is_folder: bool = False) -> Iterator[Path]:
         with contextlib.suppress(OSError):
             _lock_file(path).unlink()  # while it is held, so that no other process holds what is removed
         os.close(descriptor)
+        if isinstance(target, Url):
+            with contextlib.suppress(OSError):
+                path.parent.rmdir()
 
 
 @contextlib.contextmanager
@@ -79,7 +95,7 @@ def atomic_file(target: Location) -> Iterator[BinaryIO]:
     """A file to write that takes the name `target` when the block ends well and vanishes when it does not.
 
     Raises:
-        UsageError, RecordingError: see `held`.
+        UsageError, RecordingError, RemoteError: see `atomic_path`.
     """
     with atomic_path(target) as partial, partial.open("xb") as stream:
         yield stream
@@ -91,6 +107,7 @@ def atomic_path(target: Location) -> Iterator[Path]:
 
     Raises:
         UsageError, RecordingError: see `held`.
+        RemoteError: it cannot be sent; it is kept where the error says.
     """
     with held(target) as path, _failing_as(target):
         partial = _beside(path)
@@ -98,7 +115,10 @@ def atomic_path(target: Location) -> Iterator[Path]:
             yield partial
             with partial.open("rb") as stream:
                 os.fsync(stream.fileno())
-            partial.replace(path)
+            if isinstance(target, Url):
+                send_file(partial, target.text)
+            else:
+                partial.replace(path)
         finally:
             partial.unlink(missing_ok=True)
 
@@ -108,13 +128,16 @@ def atomic_folder(target: Location) -> Iterator[Path]:
     """A folder to fill, which takes the place of `target` when the block ends well and else vanishes.
 
     Raises:
-        UsageError, RecordingError: see `held`.
+        UsageError, RecordingError, RemoteError: see `atomic_path`.
     """
     with held(target, is_folder=True) as path, _failing_as(target):
         partial, old = _beside(path), _beside(path)
         try:
             partial.mkdir()
             yield partial
+            if isinstance(target, Url):
+                send_folder(partial, target.text)
+                return
             if path.exists():
                 path.rename(old)
             try:
@@ -125,6 +148,12 @@ def atomic_folder(target: Location) -> Iterator[Path]:
         finally:
             for folder in (partial, old):
                 _remove(folder)
+
+
+def _path(target: Location) -> Path:
+    if isinstance(target, Path):
+        return target
+    raise TypeError(f"{target!r} is no location")
 
 
 def _beside(path: Path) -> Path:
@@ -140,11 +169,18 @@ def _lock_file(path: Path) -> Path:
     return path.with_name(f".{path.name}.lock")
 
 
-def _lock(path: Path) -> int | None:
+def _lock(path: Path, *, makes_folder: bool) -> int | None:
     """An open file that is locked for as long as it is open; None if another process has locked it."""
     name = _lock_file(path)
     while True:
-        descriptor = os.open(name, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        if makes_folder:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            descriptor = os.open(name, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o666)
+        except FileNotFoundError:  # whoever made the folder before removed it after that
+            if makes_folder:
+                continue
+            raise
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             if os.path.samestat(os.fstat(descriptor), name.stat()):
@@ -184,4 +220,10 @@ def _failing_as(target: Location) -> Iterator[None]:
         yield
     except OSError as error:
         reason = error.strerror or str(error)
+        if isinstance(target, Url):
+            folder = staged_output(target.text).parent
+            raise RecordingError(
+                f"{target}: cannot be made in {folder} ({reason}); free space there, or let MCAP_LANDMARKS_CACHE name "
+                "another folder"
+            ) from error
         raise RecordingError(f"{target}: cannot be written ({reason}); free space or choose another place") from error

@@ -1,13 +1,14 @@
 """Where a file is: a path of this machine or a URL. What a user names is a `Location` until it is opened."""
 
 import glob
+import os
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import BinaryIO, Literal, Protocol
 from urllib.parse import unquote, urlsplit
 
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.remote.addresses import URL, scheme_of, shown
+from mcap_landmarks.remote.addresses import URL, check_no_password, scheme_of, shown
 
 
 class Location(Protocol):
@@ -26,6 +27,12 @@ class Location(Protocol):
     @property
     def suffix(self) -> str:
         """The name's ending with its dot, empty if it has none."""
+
+    def __truediv__(self, name: str, /) -> "Location":
+        """What has this name in the folder that this is."""
+
+    def with_name(self, name: str, /) -> "Location":
+        """What has this name beside this."""
 
     def open(self, mode: Literal["rb"], /) -> BinaryIO:
         """The file, for reading.
@@ -67,6 +74,14 @@ class Url:
         """See `Location`."""
         return self._path.suffix
 
+    def __truediv__(self, name: str, /) -> "Url":
+        """See `Location`."""
+        return Url(f"{self.text.rstrip('/')}/{name}")
+
+    def with_name(self, name: str, /) -> "Url":
+        """See `Location`."""
+        return Url(f"{self.text[: self.text.rstrip('/').rindex('/')]}/{name}")
+
     def open(self, mode: Literal["rb"], /) -> BinaryIO:  # noqa: ARG002 # the one that `Location` has
         """See `Location`; only what is read is fetched.
 
@@ -85,11 +100,12 @@ def location(text: str | Path) -> Location:
     What `file://` names is a path, too (RFC 8089).
 
     Raises:
-        UsageError: a file of another host.
+        UsageError: a file of another host, or it has a password.
     """
     if not isinstance(text, str) or not URL.match(text):
         return Path(text)
     if scheme_of(text) != "file":
+        check_no_password(text)
         return Url(text)
     parts = urlsplit(text)
     if parts.netloc not in {"", "localhost"}:
@@ -115,17 +131,6 @@ def to_read(place: Location) -> Path:
     if place.exists() and not (place.is_file() or place.is_dir()):
         raise UsageError(f"{place} is neither a file nor a folder; save what it gives to a file first")
     return place
-
-
-def to_write(place: Location) -> Path:
-    """The path of a file or folder that is made or replaced.
-
-    Raises:
-        UsageError: it is not on this machine.
-    """
-    if isinstance(place, Path):
-        return place
-    raise UsageError(f"{place}: URLs cannot be written yet; write to a file and upload that")
 
 
 def size_of(place: Location) -> int:
@@ -159,6 +164,67 @@ def matching(place: Location) -> list[Location]:
     if not found:
         raise UsageError(f"{place}: no file matches; quote the pattern and check the folder")
     return [Path(name) for name in found]
+
+
+def same_place(one: Location, other: Location) -> bool:
+    """Whether two names are of one place: behind links, and with or without a slash at the end of a URL."""
+    return address(one) == address(other)
+
+
+def address(place: Location) -> str:
+    """What all names of a place have in common: its path behind links, or its URL."""
+    return place.text.rstrip("/") if isinstance(place, Url) else os.path.realpath(str(place))
+
+
+def files_in(folder: Location) -> list[Location]:
+    """What lies in a folder, by name; of a URL all files below it. Nothing where there is no such folder.
+
+    Raises:
+        UsageError, RemoteError: see `Url.open`.
+    """
+    if isinstance(folder, Url):
+        from mcap_landmarks.remote.store_listing import urls_below  # noqa: PLC0415 # not loaded for paths
+
+        return [Url(text) for text in urls_below(folder.text)]
+    path = to_read(folder)
+    return [*sorted(path.iterdir())] if path.is_dir() else []
+
+
+def is_there(place: Location) -> bool:
+    """Whether there is a file of this name, or on this machine anything else.
+
+    Raises:
+        UsageError, RemoteError: see `Url.open`.
+    """
+    if isinstance(place, Url):
+        from mcap_landmarks.remote.uploads import is_stored  # noqa: PLC0415 # not loaded for paths
+
+        return is_stored(place.text)
+    return to_read(place).exists()
+
+
+def check_there(place: Location) -> None:
+    """Refuse a URL where nothing lies, before hours of work; of a web server whoever opens it finds out.
+
+    Raises:
+        UsageError, RemoteError: see `Url.open`.
+    """
+    if isinstance(place, Url):
+        is_folder(place)
+
+
+def remove(place: Location) -> None:
+    """Remove a file.
+
+    Raises:
+        OSError, RemoteError: it cannot be removed.
+    """
+    if isinstance(place, Url):
+        from mcap_landmarks.remote.uploads import remove_stored  # noqa: PLC0415 # not loaded for paths
+
+        remove_stored(place.text)
+    else:
+        to_read(place).unlink()
 
 
 def is_folder(place: Location) -> bool:

@@ -9,7 +9,7 @@ from mcap_landmarks.catalogue.catalogue_columns import COLUMNS, NEEDED, Catalogu
 from mcap_landmarks.catalogue.parquet_file import from_parquet, need_pyarrow, to_parquet
 from mcap_landmarks.catalogue.sqlite_file import from_sqlite, to_sqlite
 from mcap_landmarks.errors import RecordingError, UsageError
-from mcap_landmarks.locations import Location
+from mcap_landmarks.locations import Location, is_there
 
 
 class _Format(NamedTuple):
@@ -40,11 +40,11 @@ def read_catalogue(place: Location) -> Catalogue:
         RecordingError: it cannot be read, or is no catalogue.
     """
     format_ = _format_of(place)
+    if not is_there(place):
+        return Catalogue({}, ())
     try:
         with place.open("rb") as stream:
             content = stream.read()
-    except FileNotFoundError:
-        return Catalogue({}, ())
     except OSError as error:
         raise RecordingError(f"{place}: cannot be read ({error.strerror or error}); check the path") from error
     try:

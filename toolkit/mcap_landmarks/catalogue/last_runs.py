@@ -9,7 +9,7 @@ from pathlib import Path, PurePosixPath
 from mcap_landmarks.catalogue.catalogue_columns import Row
 from mcap_landmarks.catalogue.catalogue_file import read_catalogue
 from mcap_landmarks.errors import RecordingError
-from mcap_landmarks.locations import Location, location
+from mcap_landmarks.locations import Location, is_there, location
 
 _WITHOUT_RESULTS = ("convert", "evaluate")
 """Verbs whose outputs are logs without results, and figures of results that a run before wrote."""
@@ -73,8 +73,8 @@ def _last_run(place: Location, log: str, name: str, row: Row) -> LastRun:
         why = str(row["errors"] or row["outcome"]).splitlines()[0].removeprefix("error: ")
         return LastRun(log, name, None, f"{log}: its last run left no output: {why}")
     output = location(str(row["output"]))
-    if isinstance(output, Path) and isinstance(place, Path):
-        output = place.parent / output
-    if isinstance(output, Path) and not output.exists():
+    if isinstance(output, Path) and not output.is_absolute():
+        output = place.parent / output if isinstance(place, Path) else place.with_name(output.as_posix())
+    if not is_there(output):
         return LastRun(log, name, None, f"{output}: is gone, which the last run of {log} wrote; run it again")
     return LastRun(log, name, output)

@@ -1,5 +1,6 @@
 """Convert bags and data sets to MCAP."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -87,7 +88,7 @@ def _report(done: "Converted") -> None:
 
 def _print(conversion: "Conversion") -> None:
     for done in conversion.outputs:
-        name = f"{done.path}/" if done.path.is_dir() else done.path
+        name = f"{done.path}/" if isinstance(done.path, Path) and done.path.is_dir() else done.path
         say(f"{name}: {counted(done.topics.total(), 'message')}, {counted(len(done.topics), 'topic')}")
 
 

@@ -12,7 +12,7 @@ from mcap_landmarks.cli.diff_sets import diff_folders
 from mcap_landmarks.cli.diff_text import DIFFERENT, print_diff, warn_losses, warn_of
 from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.errors import ToolkitError, UsageError
-from mcap_landmarks.locations import Location, size_of, to_read
+from mcap_landmarks.locations import Location, check_there, size_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,7 +41,7 @@ def command(
     landmarks and errors.
     """
     for place in filter(None, (baseline, candidate, reference)):
-        to_read(place)
+        check_there(place)
     sets.check_places()
     before, after = _sides(baseline, candidate, sets)
     try:

@@ -5,9 +5,10 @@ from typing import Annotated
 
 import typer
 
+from mcap_landmarks.atomic import check_target
 from mcap_landmarks.cli import options
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.locations import Location, location, to_read, to_write
+from mcap_landmarks.locations import Location, check_there, location
 
 Baseline = Annotated[
     Location,
@@ -100,15 +101,15 @@ class SetOptions:
     overwrite: options.Overwrite = False
 
     def check_places(self) -> None:
-        """Refuse URLs, in whatever order what else is wrong would be found.
+        """Refuse what is not there or cannot be written, before anything is compared.
 
         Raises:
-            UsageError: a file is not on this machine.
+            UsageError, RemoteError: as it says.
         """
-        for place in filter(None, (self.criteria, self.blessed)):
-            to_read(place)
+        for place in filter(None, (self.criteria, None if self.bless else self.blessed)):
+            check_there(place)
         for place in filter(None, (self.junit, self.markdown)):
-            to_write(place)
+            check_target(place)
 
     def refuse_for_files(self) -> None:
         """Refuse what only two folders have.

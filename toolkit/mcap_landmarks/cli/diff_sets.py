@@ -7,7 +7,7 @@ from mcap_landmarks.cli.console import DONE, USAGE, progress, say, say_json, tab
 from mcap_landmarks.cli.diff_options import SetOptions
 from mcap_landmarks.cli.diff_text import DIFFERENT, number, short, value_text
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.locations import Location, to_read, to_write
+from mcap_landmarks.locations import Location, same_place
 from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
@@ -22,11 +22,11 @@ def _bless(candidate: Location, folder: Location, reference: Location | None, *,
     from mcap_landmarks.diff.blessed import bless as keep
     from mcap_landmarks.diff.set_logs import blessed_logs, set_size
 
-    if to_write(folder).resolve() == to_read(candidate).resolve():
+    if same_place(folder, candidate):
         raise UsageError(f"--baseline {folder}: holds the results themselves; name another folder for what is blessed")
     with progress("read", set_size(candidate)) as advance:
         logs = blessed_logs(candidate, reference, advance)
-    path = keep(to_write(folder), logs)
+    path = keep(folder, logs)
     if json:
         say_json("diff_bless", {"output": str(path), "logs": [log.name for log in logs]})
     else:

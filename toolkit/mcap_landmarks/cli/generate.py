@@ -83,7 +83,7 @@ def _list(json: bool) -> None:
         say(f"{name:24}{text}")
 
 
-def _document(staged: "Staged", output: Path, summary: "Summary") -> dict[str, object]:
+def _document(staged: "Staged", output: Location, summary: "Summary") -> dict[str, object]:
     return {
         "output": str(output),
         "scenario": staged.name,
@@ -94,7 +94,7 @@ def _document(staged: "Staged", output: Path, summary: "Summary") -> dict[str, o
     }
 
 
-def _print(output: Path, summary: "Summary") -> None:
+def _print(output: Location, summary: "Summary") -> None:
     table(["topic", "messages"], [[topic, str(count)] for topic, count in sorted(summary.messages.items())])
     collisions = f", {counted(len(summary.collisions), 'collision')}" if summary.collisions else ""
     say(f"{output}: {summary.simulated_s:.1f} s simulated{collisions}")

@@ -1,6 +1,5 @@
 """Build a landmark map from logs."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -65,7 +64,7 @@ def command(
         raise typer.Exit(PARTIAL)
 
 
-def _from_reference(logs: list[Location], database: Path, given: LogOptions) -> None:
+def _from_reference(logs: list[Location], database: Location, given: LogOptions) -> None:
     from mcap_landmarks.runs.reference_map import map_from_reference
 
     if len(logs) != 1:
@@ -86,7 +85,7 @@ def _stages(run: "MapRun", log: "MappedLog") -> "list[StageRun]":
     return [*log.stages, dataclasses.replace(run.build, outcome=log.outcome)]
 
 
-def _document(run: "MapRun", database: Path) -> dict[str, object]:
+def _document(run: "MapRun", database: Location) -> dict[str, object]:
     import dataclasses
 
     tentative = int(run.landmark_map.tentative.sum())
@@ -115,7 +114,7 @@ def _document(run: "MapRun", database: Path) -> dict[str, object]:
     }
 
 
-def _print(run: "MapRun", database: Path) -> None:
+def _print(run: "MapRun", database: Location) -> None:
     tentative = int(run.landmark_map.tentative.sum())
     say(f"{database}: {counted(len(run.landmark_map) - tentative, 'landmark')}, {tentative} tentative")
     rows = [

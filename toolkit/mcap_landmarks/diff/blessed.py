@@ -10,6 +10,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.locations import Location
 
 BLESSED = "blessed.json"
 """The file in a folder of blessed results."""
@@ -26,14 +27,15 @@ class BlessedLog:
     figures: Mapping[str, Annotated[float, Field(allow_inf_nan=False)] | None]
 
 
-def read_blessed(path: Path) -> list[BlessedLog]:
+def read_blessed(path: Location) -> list[BlessedLog]:
     """The logs in a file of blessed results.
 
     Raises:
         RecordingError: it cannot be read, or is none.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as stream:
+            document = json.loads(stream.read().decode("utf-8"))
         if document["schema"] != _SCHEMA:
             raise RecordingError(f"{path}: is {document['schema']} instead of {_SCHEMA}; bless the results anew")
         return TypeAdapter(list[BlessedLog]).validate_python(document["logs"])
@@ -43,18 +45,14 @@ def read_blessed(path: Path) -> list[BlessedLog]:
         raise RecordingError(f"{path}: holds no blessed results; bless them anew with --bless") from error
 
 
-def bless(folder: Path, logs: Sequence[BlessedLog]) -> Path:
+def bless(folder: Location, logs: Sequence[BlessedLog]) -> Location:
     """Keep the figures of logs in a folder, which is made if its parent is there; the file.
 
     Raises:
         UsageError, RecordingError: it cannot be written.
     """
-    if not folder.exists() and not folder.parent.is_dir():
-        raise UsageError(f"{folder}: the folder {folder.parent} does not exist; create it first")
-    try:
-        folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise UsageError(f"{folder}: cannot be made a folder ({error.strerror}); choose another place") from error
+    if isinstance(folder, Path):
+        _make(folder)
     entries = [
         {
             "name": log.name,
@@ -67,3 +65,12 @@ def bless(folder: Path, logs: Sequence[BlessedLog]) -> Path:
     with atomic_file(folder / BLESSED) as stream:
         stream.write(json.dumps({"schema": _SCHEMA, "logs": entries}, indent=1, allow_nan=False).encode() + b"\n")
     return folder / BLESSED
+
+
+def _make(folder: Path) -> None:
+    if not folder.exists() and not folder.parent.is_dir():
+        raise UsageError(f"{folder}: the folder {folder.parent} does not exist; create it first")
+    try:
+        folder.mkdir(exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{folder}: cannot be made a folder ({error.strerror}); choose another place") from error

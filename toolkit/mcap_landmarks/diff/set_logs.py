@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
 
 from mcap_landmarks.catalogue.catalogue_file import is_catalogue
 from mcap_landmarks.catalogue.last_runs import last_runs
@@ -11,7 +12,7 @@ from mcap_landmarks.diff.paired_logs import pair_logs
 from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
 from mcap_landmarks.evaluation.metrics import Reference
 from mcap_landmarks.evaluation.read import read_reference
-from mcap_landmarks.locations import Location, size_of, to_read
+from mcap_landmarks.locations import Location, address, files_in, is_folder, is_there, size_of
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.reader import open_recording
 
@@ -31,7 +32,7 @@ class SetLog:
 
 def is_set(place: Location) -> bool:
     """Whether a place holds a set of logs: a folder, or a catalogue of what a batch wrote."""
-    return is_catalogue(place) or to_read(place).is_dir()
+    return is_catalogue(place) or is_folder(place)
 
 
 def logs_in(folder: Location) -> list[SetLog]:
@@ -44,13 +45,12 @@ def logs_in(folder: Location) -> list[SetLog]:
     """
     if is_catalogue(folder):
         return _catalogued(folder)
-    place = to_read(folder)
-    if (place / BLESSED).exists():
-        return [SetLog(log.name, fingerprint=log.fingerprint, blessed=log) for log in read_blessed(place / BLESSED)]
-    paths = sorted(path for path in place.rglob(f"*{_SUFFIX}") if path.is_file() and not path.name.startswith("."))
-    if not paths:
+    if is_there(folder / BLESSED):
+        return [SetLog(log.name, fingerprint=log.fingerprint, blessed=log) for log in read_blessed(folder / BLESSED)]
+    files = _below(folder, _SUFFIX)
+    if not files:
         raise UsageError(f"{folder}: holds neither logs (*{_SUFFIX}) nor {BLESSED}; name a folder of results")
-    return [_listed(path, path.relative_to(place).with_suffix("").as_posix()) for path in paths]
+    return [_listed(path, PurePosixPath(name).with_suffix("").as_posix()) for name, path in files.items()]
 
 
 def _catalogued(place: Location) -> list[SetLog]:
@@ -66,14 +66,25 @@ def maps_in(place: Location) -> list[str]:
     if is_catalogue(place):
         found = [run.output.name for run in last_runs(place) if run.output is not None and run.output.suffix == ".db"]
         return sorted(found)
-    return sorted(path.name for path in to_read(place).rglob("*.db"))
+    return sorted(path.name for path in _below(place, ".db").values())
 
 
 def set_size(place: Location) -> int:
     """Bytes of all logs of a set."""
     if is_catalogue(place):
         return sum(size_of(run.output) for run in last_runs(place) if run.output is not None)
-    return sum(size_of(path) for path in to_read(place).rglob(f"*{_SUFFIX}"))
+    return sum(size_of(path) for path in _below(place, _SUFFIX).values())
+
+
+def _below(folder: Location, suffix: str) -> dict[str, Location]:
+    """The files of a suffix in a folder and its folders, by their paths from there; hidden ones are left out."""
+    if isinstance(folder, Path):
+        paths = (path for path in sorted(folder.rglob(f"*{suffix}")) if path.is_file())
+        found: dict[str, Location] = {path.relative_to(folder).as_posix(): path for path in paths}
+    else:
+        begin = len(address(folder)) + 1
+        found = {address(file)[begin:]: file for file in files_in(folder) if file.suffix == suffix}
+    return {name: path for name, path in found.items() if not path.name.startswith(".")}
 
 
 def _listed(path: Location, name: str) -> SetLog:

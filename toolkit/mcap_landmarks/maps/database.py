@@ -11,7 +11,7 @@ import numpy as np
 from mcap_landmarks import memory
 from mcap_landmarks.atomic import atomic_file
 from mcap_landmarks.errors import MapError
-from mcap_landmarks.locations import Location, to_read
+from mcap_landmarks.locations import Location, is_there, to_read
 from mcap_landmarks.maps.model import Group, LandmarkMap, MapSource
 from mcap_landmarks.maps.neighbours import Neighbours
 from mcap_landmarks.resources import resource
@@ -46,7 +46,7 @@ def read_map(path: Location) -> LandmarkMap:
 
 def read_manifest(path: Location) -> dict[str, str]:
     """What ran to build the map in a database, by entry; nothing if that is unknown, or there is no such map."""
-    if not to_read(path).is_file():
+    if not is_there(path):
         return {}
     try:
         with _reading(path) as database:

@@ -1,7 +1,7 @@
 """A landmark map from a file and to one, of whichever format the file's name stands for."""
 
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.locations import Location, to_write
+from mcap_landmarks.locations import Location, is_there
 from mcap_landmarks.maps.database import read_map, write_map
 from mcap_landmarks.maps.exchange import SUFFIXES, export_map, format_of, import_map
 from mcap_landmarks.maps.model import LandmarkMap
@@ -28,7 +28,7 @@ def write_map_file(path: Location, landmark_map: LandmarkMap, *, overwrite: bool
     if path.suffix.lower() not in {_DATABASE, *SUFFIXES}:
         known = ", ".join([_DATABASE, *SUFFIXES])
         raise UsageError(f"{path}: the name does not tell the format; let it end in one of {known}")
-    if to_write(path).exists() and not overwrite:
+    if not overwrite and is_there(path):
         raise UsageError(f"{path}: there is a file already; give overwrite=True, or another name")
     if path.suffix.lower() in SUFFIXES:
         export_map(path, landmark_map, format_of(path))

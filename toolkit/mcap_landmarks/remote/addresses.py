@@ -42,6 +42,18 @@ def shown(text: str) -> str:
     return f"{text[:begin]}{user}{at}{host}{rest}"
 
 
+def check_no_password(text: str) -> None:
+    """Refuse a URL with a password in it: it would stand in the history of the shell, and in lists of processes.
+
+    Raises:
+        UsageError: as it says.
+    """
+    place = re.split(r"[/?#]", text[text.index("://") + 3 :], maxsplit=1)[0]
+    user, at, _ = place.rpartition("@")
+    if at and (":" in user or scheme_of(text) in _WEB):
+        raise UsageError(f"{shown(text)}: leave user and password out; credentials come from the environment")
+
+
 def redacted(text: str) -> str:
     """A text of others, such as a library's error, with every URL in it as it may be shown."""
     return _IN_TEXT.sub(lambda found: shown(found[0]), text)

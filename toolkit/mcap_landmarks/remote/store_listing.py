@@ -39,6 +39,20 @@ def urls_matching(text: str) -> list[str]:
     return [_beside(text, name) for name in files]
 
 
+def urls_below(text: str) -> list[str]:
+    """The files below a prefix, sorted by name; none where there is no such prefix.
+
+    Raises:
+        UsageError: see `store`.
+        RemoteError: it cannot be listed.
+    """
+    file_system, path = store(text)
+    prefix = f"{path.rstrip('/')}/"
+    found = persistently(text, lambda: file_system.find(prefix, detail=True))
+    names = (name for name, entry in found.items() if entry.get("type") == "file")
+    return [_beside(text, name) for name in sorted(names) if name.startswith(prefix) and not name.endswith("/")]
+
+
 def is_url_folder(text: str) -> bool:
     """Whether a URL names a prefix of files and no file; that of a web server never does.
 

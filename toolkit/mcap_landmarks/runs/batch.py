@@ -14,7 +14,7 @@ from pathlib import Path
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.inspection.open_logs import open_logs
-from mcap_landmarks.locations import location, to_read
+from mcap_landmarks.locations import Location, location, same_place, to_read
 
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM", "VECLIB_MAXIMUM_THREADS"),
@@ -29,7 +29,7 @@ class ProcessTask:
     """One log, where its result goes, and the command that makes it."""
 
     log: Path
-    output: Path
+    output: Location
     command: tuple[str, ...]
 
 
@@ -60,7 +60,7 @@ def find_logs(patterns: Sequence[str]) -> list[Path]:
     return list(found)
 
 
-def outputs_in(folder: Path, logs: Sequence[Path], suffix: str) -> dict[Path, Path]:
+def outputs_in(folder: Location, logs: Sequence[Path], suffix: str) -> dict[Path, Location]:
     """Output by log: the log's name with `suffix` in the folder. Earlier outputs there are no logs and are left out.
 
     A bag or data set that holds several logs, as one per robot, gets a folder of its own, without suffix.
@@ -68,16 +68,16 @@ def outputs_in(folder: Path, logs: Sequence[Path], suffix: str) -> dict[Path, Pa
     Raises:
         UsageError: two logs would write the same file, no log is left, or a target cannot be written.
     """
-    outputs: dict[Path, Path] = {}
-    taken: dict[Path, Path] = {}
+    outputs: dict[Path, Location] = {}
+    taken: dict[Location, Path] = {}
     for log in logs:
-        if log.suffix == suffix and log.resolve().parent == folder.resolve():
+        if log.suffix == suffix and same_place(log.resolve().parent, folder):
             continue
         name = log.name if log.is_dir() else log.stem
         target = folder / (name if _holds_several(log) else f"{name}{suffix}")
         if target in taken:
             raise UsageError(f"{log}: {taken[target]} also writes {target}; rename one, or run them apart")
-        if not target.is_dir():
+        if not isinstance(target, Path) or not target.is_dir():
             check_target(target)
         outputs[log], taken[target] = target, log
     if not outputs:

@@ -60,7 +60,7 @@ def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
 
 def build_map_of(
     requests: Sequence[Request],
-    database: Path,
+    database: Location,
     output: Location | None = None,
     prior: Location | None = None,
     watch: Watch = unwatched,

@@ -10,6 +10,7 @@ from mcap_landmarks.config import effective
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.inspection.mcap_log import McapLog
 from mcap_landmarks.inspection.open_logs import OpenLog, notes_of
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import CARRIED, RUN, Manifest, entry_text, file_hash, is_generated
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.chunk_copy import WholeChunk
@@ -36,7 +37,7 @@ class Converted:
     Those of topics that are `left_out`, since nobody could understand them, are among the lost ones.
     """
 
-    path: Path
+    path: Location
     format: OutputFormat = OutputFormat.MCAP
     topics: Counter[str] = field(default_factory=Counter)
     declared: int = 0
@@ -73,7 +74,7 @@ class Job:
         self._files: list[BagFile] = []
         self._has_attached = False
 
-    def run(self, target: Path, advance: Progress) -> Converted:
+    def run(self, target: Location, advance: Progress) -> Converted:
         """Write the one output.
 
         Raises:
@@ -83,7 +84,7 @@ class Job:
         return self.write(target, self.inputs.selection.span, advance, is_last=True)
 
     def write(
-        self, target: Path, span: tuple[int | None, int | None], advance: Progress, *, is_last: bool
+        self, target: Location, span: tuple[int | None, int | None], advance: Progress, *, is_last: bool
     ) -> Converted:
         """Write the messages of some time, with what holds at its start because of messages before it.
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from mcap_landmarks.config import Settings
 from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.inspection.open_logs import OpenLog, open_logs
-from mcap_landmarks.locations import Location, to_write
+from mcap_landmarks.locations import Location
 from mcap_landmarks.progress import Progress, Watch
 from mcap_landmarks.runs.conversion import Converted, Job
 from mcap_landmarks.runs.conversion_inputs import ConversionInputs
@@ -56,15 +56,14 @@ def convert(
     Raises:
         ToolkitError: nothing could be converted; nothing is left behind.
     """
-    there = to_write(output)
     conversion = Conversion()
     _check_once(inputs)
     with contextlib.ExitStack() as stack:
         logs = [log for place in inputs for log in stack.enter_context(open_logs(place, settings))]
-        stack.enter_context(no_empty_folder(there))
-        if there.is_file():
-            check_apart([there], [*inputs, *beside])
-        plan = planned(logs, there, form)
+        stack.enter_context(no_empty_folder(output))
+        if isinstance(output, Path) and output.is_file():
+            check_apart([output], [*inputs, *beside])
+        plan = planned(logs, output, form)
         check_apart(plan, [*inputs, *beside])
         hash_of = stack.enter_context(input_hashes(log.path for log in logs))
         for target, group in plan.items():
@@ -89,13 +88,13 @@ def _check_once(inputs: Sequence[Location]) -> None:
 def _earlier(verb: str, logs: Sequence[OpenLog], hash_of: HashOf) -> IsEarlier:
     """See `earlier_recording`; it waits for the hashes only where there is a file."""
 
-    def is_earlier(path: Path) -> bool:
+    def is_earlier(path: Location) -> bool:
         return earlier_recording(verb, [hash_of(log.path) for log in logs])(path)
 
     return is_earlier
 
 
-def _written(job: Job, target: Path, form: OutputForm, replacing: Replacing, advance: Progress) -> list[Converted]:
+def _written(job: Job, target: Location, form: OutputForm, replacing: Replacing, advance: Progress) -> list[Converted]:
     if form.to is OutputFormat.ROSBAG2:
         return [write_bag(job, target, form.split, replacing, advance)]
     if form.to is OutputFormat.BAG:

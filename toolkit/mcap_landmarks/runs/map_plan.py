@@ -32,8 +32,8 @@ class MapTask:
     """The logs of a map (their settings are the first one's), the database, each log's output, a map to extend."""
 
     requests: tuple[Request, ...]
-    database: Path
-    outputs: Mapping[Location, Path] = field(default_factory=dict)
+    database: Location
+    outputs: Mapping[Location, Location] = field(default_factory=dict)
     prior: Location | None = None
 
     @property

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from mcap_landmarks.errors import MessageError, UsageError
 from mcap_landmarks.inspection.open_logs import OpenLog
+from mcap_landmarks.locations import Location
 from mcap_landmarks.recording.chunk_form import ChunkForm
 from mcap_landmarks.recording.writer import ROS2, profile_of
-from mcap_landmarks.runs.outputs import make_folder, output_files
+from mcap_landmarks.runs.outputs import make_folder, names_folder, output_files
 from mcap_landmarks.runs.splitting import Split
 from mcap_landmarks.sources import ros1_type
 from mcap_landmarks.stage import Connection
@@ -54,7 +55,7 @@ def refusal(to: OutputFormat, connection: Connection) -> str:
     return ""
 
 
-def planned(logs: Sequence[OpenLog], output: Path, form: OutputForm) -> dict[Path, list[OpenLog]]:
+def planned(logs: Sequence[OpenLog], output: Location, form: OutputForm) -> dict[Location, list[OpenLog]]:
     """Which logs go into which output: all into one that is named, else each into one of its name in a folder.
 
     Raises:
@@ -62,10 +63,10 @@ def planned(logs: Sequence[OpenLog], output: Path, form: OutputForm) -> dict[Pat
     """
     _check_split(form)
     several, own = len(logs) > len({log.path for log in logs}), _SUFFIXES.get(form.to, "")
-    if output.suffix.lower() in _FILES and not (form.names_folder or output.is_dir()):
+    if output.suffix.lower() in _FILES and not (form.names_folder or names_folder(output)):
         _check_file(output, form, len(logs) if several else 1)
         return {next(iter(output_files([output], output).values())): list(logs)}
-    if output.exists() and not output.is_dir():
+    if isinstance(output, Path) and output.exists() and not output.is_dir():
         raise UsageError(
             f"{output} is a file and no folder; give the output another name" + f", as NAME{own}" * bool(own)
         )
@@ -79,7 +80,7 @@ def _check_split(form: OutputForm) -> None:
         raise UsageError("--to bag writes each log as one file; split it with --to rosbag2, or as MCAP")
 
 
-def _check_file(output: Path, form: OutputForm, logs: int) -> None:
+def _check_file(output: Location, form: OutputForm, logs: int) -> None:
     """Refuse the name of a file for what is of another format, or becomes several."""
     own = _SUFFIXES.get(form.to)
     if output.suffix.lower() != own:
@@ -90,7 +91,7 @@ def _check_file(output: Path, form: OutputForm, logs: int) -> None:
         raise UsageError(f"{output}: the input holds {logs} logs; give -o a folder, without {own}")
 
 
-def _remedy(output: Path, to: OutputFormat) -> str:
+def _remedy(output: Location, to: OutputFormat) -> str:
     if to is OutputFormat.ROSBAG2:
         return f"a ROS 2 bag is a folder; name it {output.stem}"
     if to is OutputFormat.BAG:
@@ -99,10 +100,10 @@ def _remedy(output: Path, to: OutputFormat) -> str:
     return f"convert writes MCAP; name the output {output.stem}.mcap, or make a bag with {other}"
 
 
-def _in_folder(names: Collection[str], logs: Sequence[OpenLog], output: Path) -> dict[Path, list[OpenLog]]:
+def _in_folder(names: Collection[str], logs: Sequence[OpenLog], output: Location) -> dict[Location, list[OpenLog]]:
     """One output per log."""
     folder = make_folder(output)
-    plan: dict[Path, list[OpenLog]] = {}
+    plan: dict[Location, list[OpenLog]] = {}
     for name, log in zip(names, logs, strict=True):
         if folder / name in plan:
             raise UsageError(f"{log.path}: another input also writes {folder / name}; convert it into another folder")

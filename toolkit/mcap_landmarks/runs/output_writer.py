@@ -5,9 +5,9 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from operator import itemgetter
-from pathlib import Path
 
 from mcap_landmarks.channels import SHARED
+from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import (
     CARRIED,
     CONTENT,
@@ -41,7 +41,7 @@ _OF_THE_CONTENT = frozenset({CONTENT, LOSSES, CARRIED, SHARED_CHANNELS})
 
 
 def write_output(
-    session: Session, output: Path, verb: str, inputs: Sequence[str], watch: Watch
+    session: Session, output: Location, verb: str, inputs: Sequence[str], watch: Watch
 ) -> tuple[list[str], list[str]]:
     """Write the output, unless it is there already; notes on what is in it, and what of the log is unreadable.
 
@@ -78,7 +78,7 @@ def write_output(
 
 
 def _write(
-    session: Session, output: Path, entries: Mapping[str, str], layers: Sequence[Layer], watch: Watch
+    session: Session, output: Location, entries: Mapping[str, str], layers: Sequence[Layer], watch: Watch
 ) -> tuple[list[str], dict[str, int]]:
     """Write the output; what of the log is unreadable, and what was carried over from before its start, by topic."""
     span, source, view = session.request.span, session.log.recording, LayeredLog(session.log.path, layers)

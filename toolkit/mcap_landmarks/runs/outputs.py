@@ -6,10 +6,15 @@ from pathlib import Path
 
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.errors import RecordingError, UsageError
-from mcap_landmarks.locations import Location, to_write
+from mcap_landmarks.locations import Location, Url
 
 
-def output_files(inputs: Sequence[Location], output: Location) -> dict[Location, Path]:
+def names_folder(output: Location) -> bool:
+    """Whether an output is a folder: one that is there, or a URL with a slash at its end."""
+    return output.text.endswith("/") if isinstance(output, Url) else isinstance(output, Path) and output.is_dir()
+
+
+def output_files(inputs: Sequence[Location], output: Location) -> dict[Location, Location]:
     """Output file by input: `output` itself for one input, else files of the inputs' names in the folder `output`.
 
     The folder is made if its parent exists. A single input goes into `output` too if that is a folder.
@@ -17,10 +22,10 @@ def output_files(inputs: Sequence[Location], output: Location) -> dict[Location,
     Raises:
         UsageError: two inputs would write the same file, or the target cannot be written.
     """
-    if len(inputs) == 1 and not to_write(output).is_dir():
+    if len(inputs) == 1 and not names_folder(output):
         return {inputs[0]: check_target(output)}
     folder = make_folder(output)
-    files: dict[Location, Path] = {}
+    files: dict[Location, Location] = {}
     for log in inputs:
         target = folder / f"{log.stem}.mcap"
         if target in files.values():
@@ -29,14 +34,15 @@ def output_files(inputs: Sequence[Location], output: Location) -> dict[Location,
     return files
 
 
-def make_folder(place: Location) -> Path:
-    """Make a folder whose parent exists; its path.
+def make_folder(folder: Location) -> Location:
+    """Make a folder whose parent exists; of a URL there is nothing to make.
 
     Raises:
-        UsageError: it is not on this machine, the parent does not exist, or the name belongs to a file.
+        UsageError: the parent does not exist, the name belongs to a file, or nothing can be written there.
         RecordingError: it may not be made there.
     """
-    folder = to_write(place)
+    if not isinstance(folder, Path):
+        return check_target(folder, is_folder=True)
     if not folder.parent.is_dir():
         raise UsageError(f"{folder}: the folder {folder.parent} does not exist; create it first")
     if folder.exists() and not folder.is_dir():
@@ -52,8 +58,10 @@ def make_folder(place: Location) -> Path:
 @contextlib.contextmanager
 def no_empty_folder(place: Location) -> Iterator[None]:
     """Take a folder away again that was made in the block, if the block fails and it holds nothing."""
-    folder = to_write(place)
-    is_new, is_whole = not folder.exists(), False
+    if not isinstance(place, Path):
+        yield
+        return
+    folder, is_new, is_whole = place, not place.exists(), False
     try:
         yield
         is_whole = True

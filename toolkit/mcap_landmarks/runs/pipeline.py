@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import Outcome
@@ -23,7 +22,7 @@ class LogRun:
     """What became of one log: where the output is, what each stage did, and what is to be said about the log."""
 
     recording: Location
-    output: Path
+    output: Location
     stages: tuple[StageRun, ...]
     notes: tuple[str, ...] = ()
     losses: tuple[str, ...] = ()
@@ -40,7 +39,7 @@ class LogRun:
 
 def run_stages(
     request: Request,
-    output: Path,
+    output: Location,
     names: Sequence[str],
     verb: str,
     watch: Watch = unwatched,

@@ -31,7 +31,7 @@ _NO_CRC = "the format has no CRC: nothing verifies the messages beyond the defin
 class Recovered:
     """The output, its messages by topic, attachments and metadata records that were saved, and the account."""
 
-    path: Path
+    path: Location
     topics: Mapping[str, int]
     damage: Damage
     attachments: int
@@ -66,7 +66,7 @@ def _is_mcap(path: Path) -> bool:
         raise RecordingError(f"{path}: cannot be read ({error.strerror}); check the path") from error
 
 
-def _recover_mcap(path: Path, target: Path, watch: Watch, *, overwrite: bool) -> Recovered:
+def _recover_mcap(path: Path, target: Location, watch: Watch, *, overwrite: bool) -> Recovered:
     with watch(f"hash {path.name}", size_of(path)) as advance:
         hash_ = file_hash(path, advance)
     with (
@@ -117,7 +117,7 @@ def _copy(recording: Recording, writer: RecordingWriter, advance: Progress) -> N
             writer.write(piece)
 
 
-def _recover_bag(path: Path, target: Path, watch: Watch, settings: Settings, *, overwrite: bool) -> Recovered:
+def _recover_bag(path: Path, target: Location, watch: Watch, settings: Settings, *, overwrite: bool) -> Recovered:
     with reading_from_front():
         conversion = convert([path], target, Selection(), settings, watch, overwrite=overwrite, verb="recover")
     (done,) = conversion.outputs

@@ -3,19 +3,18 @@
 import contextlib
 import hashlib
 import json
-import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from mcap_landmarks.atomic import check_target, held
 from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
-from mcap_landmarks.locations import Location, to_read, to_write
+from mcap_landmarks.locations import Location, Url, address, check_there, files_in, is_there
 from mcap_landmarks.manifest import CONTENT, RUN, entry_text, file_hash
 from mcap_landmarks.maps.database import read_manifest
 from mcap_landmarks.recording.reader import open_recording
 
-IsEarlier = Callable[[Path], bool]
+IsEarlier = Callable[[Location], bool]
 """Says of a file that is there whether it is an earlier result of what is made now."""
 
 
@@ -35,18 +34,17 @@ def output_to(
     *,
     overwrite: bool = False,
     is_folder: bool = False,
-) -> Iterator[Path]:
-    """The path of an output, a file or a folder; no other process writes it while the block runs, which may replace it.
+) -> Iterator[None]:
+    """Hold an output, a file or a folder; no other process writes it while the block runs, which may replace it.
 
     Raises:
         UsageError: it cannot be written, is one of the files that are `read`, or has to stay (see `check_replaceable`).
         RecordingError: another process writes it, or the folder may not be written.
     """
-    path = check_target(target, is_folder=is_folder)
-    check_apart([path], read)
-    with held(path, is_folder=is_folder):
-        check_replaceable(path, is_earlier, overwrite=overwrite)
-        yield path
+    check_apart([check_target(target, is_folder=is_folder)], read)
+    with held(target, is_folder=is_folder):
+        check_replaceable(target, is_earlier, overwrite=overwrite, is_folder=is_folder)
+        yield
 
 
 @contextlib.contextmanager
@@ -58,11 +56,11 @@ def new_files(
     Raises:
         UsageError, RecordingError: see `output_to`.
     """
-    paths = [check_target(target) for target in targets if target is not None]
-    check_apart(paths, [place for place in read if place is not None])
+    named = [check_target(target) for target in targets if target is not None]
+    check_apart(named, [place for place in read if place is not None])
     with contextlib.ExitStack() as stack:
-        for path in paths:
-            stack.enter_context(output_to(path, (), lambda _path: False, overwrite=overwrite))
+        for target in named:
+            stack.enter_context(output_to(target, (), lambda _place: False, overwrite=overwrite))
         yield
 
 
@@ -70,17 +68,31 @@ def check_apart(targets: Collection[Location], read: Iterable[Location]) -> None
     """Refuse outputs that are one file, or that are read: also by another name, through links, or in a folder.
 
     Raises:
-        UsageError: as it says, or a file is not on this machine.
+        UsageError: as it says.
+        RemoteError: what is read is elsewhere, and not there.
     """
-    paths, sources = [to_write(target) for target in targets], [to_read(place) for place in read]
-    known: dict[str, Path] = {}
-    for path in paths:
-        other = known.setdefault(os.path.realpath(path), path)
-        if other is not path:
-            raise UsageError(f"{path}: two outputs would be this file; give each a name of its own")
-    for path in filter(Path.exists, paths):
+    known: dict[str, Location] = {}
+    for target in targets:
+        other = known.setdefault(address(target), target)
+        if other is not target:
+            raise UsageError(f"{target}: two outputs would be this file; give each a name of its own")
+    sources = list(read)
+    for source in sources:
+        check_there(source)
+    for target in targets:
         for source in sources:
-            _check_pair(path, source)
+            if isinstance(target, Path) and isinstance(source, Path) and target.exists():
+                _check_pair(target, source)
+            elif isinstance(target, Url) and isinstance(source, Url):
+                _check_addresses(target, source)
+
+
+def _check_addresses(target: Url, source: Url) -> None:
+    mine, theirs = (f"{address(place).partition('?')[0]}/" for place in (target, source))
+    if mine == theirs:
+        raise UsageError(f"{target} is the input itself; write to another file")
+    if mine.startswith(theirs):
+        raise UsageError(f"{target} is part of the input {source}; write to another file")
 
 
 def _check_pair(path: Path, source: Path) -> None:
@@ -93,16 +105,19 @@ def _check_pair(path: Path, source: Path) -> None:
         raise UsageError(f"{path} holds the input {source}; write to another folder")
 
 
-def check_replaceable(path: Path, is_earlier: IsEarlier, *, overwrite: bool) -> None:
+def check_replaceable(target: Location, is_earlier: IsEarlier, *, overwrite: bool, is_folder: bool = False) -> None:
     """Refuse to replace what is there, unless it is an earlier result or the user says so.
 
     Raises:
         UsageError: as it says.
     """
-    if path.exists() and not overwrite and not is_earlier(path):
+    if overwrite:
+        return
+    exists = bool(files_in(target)) if is_folder and isinstance(target, Url) else is_there(target)
+    if exists and not is_earlier(target):
         raise UsageError(
-            f"{path} exists and is no earlier result of the same verb and inputs; write to another file, or replace it "
-            "with --overwrite"
+            f"{target} exists and is no earlier result of the same verb and inputs; write to another file, or replace "
+            "it with --overwrite"
         )
 
 
@@ -138,8 +153,9 @@ def carries(text: str) -> IsEarlier:
     return lambda path: _holds(path, text)
 
 
-def _holds(path: Path, text: str) -> bool:
-    return text.encode() in path.read_bytes()
+def _holds(place: Location, text: str) -> bool:
+    with place.open("rb") as stream:
+        return text.encode() in stream.read()
 
 
 def _made_by(verb: str, inputs: Sequence[str]) -> dict[str, str | None]:
@@ -147,7 +163,7 @@ def _made_by(verb: str, inputs: Sequence[str]) -> dict[str, str | None]:
 
 
 def _recording_with(made: Mapping[str, str | None]) -> IsEarlier:
-    def is_earlier(path: Path) -> bool:
+    def is_earlier(path: Location) -> bool:
         try:
             with open_recording(path) as recording:
                 entries = recording.metadata.get(RUN, {})

@@ -4,13 +4,13 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import chain
-from pathlib import Path
 
 from rosbags.rosbag1 import Writer
 
 from mcap_landmarks.atomic import atomic_path
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.inspection.mcap_log import McapLog
+from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.qos import KEY, is_latched
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.chunk_form import CHUNK_BYTES, ChunkForm
@@ -52,7 +52,7 @@ class _Tally:
         return short + left_out
 
 
-def write_ros1_bag(job: Job, target: Path, form: ChunkForm | None, advance: Progress) -> Converted:
+def write_ros1_bag(job: Job, target: Location, form: ChunkForm | None, advance: Progress) -> Converted:
     """Write a bag of all messages.
 
     Raises:

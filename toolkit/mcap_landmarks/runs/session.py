@@ -15,6 +15,7 @@ from mcap_landmarks.inspection.examination import Asked, Examiner
 from mcap_landmarks.inspection.log_frames import LogFrames
 from mcap_landmarks.inspection.odometry_examination import ExaminedOdometry
 from mcap_landmarks.inspection.topic_roles import choose, chosen_before
+from mcap_landmarks.locations import Location, is_there
 from mcap_landmarks.manifest import Outcome, StageRecord
 from mcap_landmarks.mounting import read_extrinsics
 from mcap_landmarks.progress import Watch
@@ -38,8 +39,10 @@ class StageRun:
 
 
 @contextlib.contextmanager
-def parts_folder(output: Path) -> Iterator[Path]:
+def parts_folder(output: Location) -> Iterator[Path]:
     """Where finished stages lie until the output is whole: `.OUTPUT.parts`, which goes when the block ends well.
+
+    That of an output elsewhere lies in the cache folder, see `remote.staged_outputs`.
 
     When it does not, what is finished stays for the next run. No other process can work on the output meanwhile.
 
@@ -73,7 +76,7 @@ def part_file(folder: Path, record: StageRecord) -> Path:
 
 
 @contextlib.contextmanager
-def open_session(request: Request, parts: Path, output: Path | None) -> Iterator["Session"]:
+def open_session(request: Request, parts: Path, output: Location | None) -> Iterator["Session"]:
     """One log to work on, with the results that lie in the log, in an earlier `output` and among the `parts`.
 
     Where the request chooses no images, those count that results in the log were made of.
@@ -101,7 +104,9 @@ def _with_images(request: Request, recording: Recording) -> Request:
 class Session:
     """One log and its results so far; made by `open_session`."""
 
-    def __init__(self, stack: ExitStack, request: Request, log: RecordedLog, parts: Path, output: Path | None) -> None:
+    def __init__(
+        self, stack: ExitStack, request: Request, log: RecordedLog, parts: Path, output: Location | None
+    ) -> None:
         self.request, self.log = request, log
         self.results = dict(log.results)
         self.of_this_run: set[str] = set()
@@ -111,7 +116,7 @@ class Session:
         self._stack, self._parts = stack, parts
         self.earlier: Recording | None = None
         self._stores: list[tuple[str, dict[str, Layer]]] = [("the log", log.results)]
-        if output is not None and output.is_file():
+        if output is not None and is_there(output):
             with contextlib.suppress(RecordingError):  # what is no recording has no results
                 self.earlier = self._open(output)
                 self._stores.append(("the earlier output", result_layers(self.earlier)))
@@ -206,7 +211,7 @@ class Session:
         self.results.update(layers)
         self.of_this_run.update(layers)
 
-    def _open(self, path: Path) -> Recording:
+    def _open(self, path: Location) -> Recording:
         return self._stack.enter_context(open_recording(path))
 
     def _why(self, record: StageRecord) -> str:

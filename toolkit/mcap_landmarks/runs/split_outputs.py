@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location, files_in, remove
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.runs.conversion import Converted, Job, NoMessagesError
 from mcap_landmarks.runs.replacing import Replacing, output_to
@@ -11,7 +12,7 @@ from mcap_landmarks.runs.splitting import Split, cuts, spans
 
 
 def write_parts(
-    job: Job, target: Path, split: Split | None, replacing: Replacing, advance: Progress
+    job: Job, target: Location, split: Split | None, replacing: Replacing, advance: Progress
 ) -> list[Converted]:
     """Write the parts of what would be one output, or without a `split` the only one.
 
@@ -24,7 +25,7 @@ def write_parts(
     times = cuts(split, job.inputs.stretches(by_message=split.count is not None)) if split else []
     parts: list[Converted] = []
     for number, span in enumerate(spans(*job.inputs.selection.span, times)):
-        path = target.with_stem(f"{target.stem}_{len(parts)}")
+        path = target.with_name(f"{target.stem}_{len(parts)}{target.suffix}")
         is_last = number == len(times)
         try:
             with output_to(path, (), replacing.is_earlier, overwrite=replacing.overwrite):
@@ -38,16 +39,16 @@ def write_parts(
     return parts
 
 
-def _remove_rest(target: Path, count: int, replacing: Replacing) -> None:
+def _remove_rest(target: Location, count: int, replacing: Replacing) -> None:
     """Remove what an earlier split into more parts left.
 
     Raises:
         UsageError: it is of something else.
     """
     name = re.compile(rf"{re.escape(target.stem)}_(\d+)\.mcap")
-    for path in sorted(target.parent.iterdir()):
+    for path in files_in(target.parent if isinstance(target, Path) else target.with_name("")):
         found = name.fullmatch(path.name)
-        if found and int(found[1]) >= count:
+        if found and int(found[1]) >= count and path == target.with_name(path.name):
             if not replacing.overwrite and not replacing.is_earlier(path):
                 raise UsageError(f"{path} is no part of this log; split it into another folder, or give --overwrite")
-            path.unlink()
+            remove(path)

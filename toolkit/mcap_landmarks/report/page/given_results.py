@@ -2,12 +2,11 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from mcap_landmarks.catalogue.catalogue_file import is_catalogue
 from mcap_landmarks.catalogue.last_runs import last_runs
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.locations import Location
+from mcap_landmarks.locations import Location, address
 from mcap_landmarks.report.page.fleet_page import UnreadResult
 
 
@@ -53,7 +52,7 @@ def _each_once(files: Iterable[Location]) -> tuple[list[Location], list[str]]:
     known: dict[str, Location] = {}
     notes = []
     for file in files:
-        key = str(file.resolve()) if isinstance(file, Path) else str(file)
+        key = address(file)
         if key in known:
             notes.append(f"{file} was named twice and counts once")
         known.setdefault(key, file)
