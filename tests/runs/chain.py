@@ -32,10 +32,12 @@ def raw_log(path: Path, count: int = COUNT) -> Path:
     return path
 
 
-def by_others(source: Path, target: Path, metadata: Sequence[tuple[str, dict[str, str]]] = ()) -> Path:
+def by_others(
+    source: Path, target: Path, metadata: Sequence[tuple[str, dict[str, str]]] = (), *, chunk_bytes: int = 1 << 20
+) -> Path:
     """A log as the mcap package writes it: all topics in the same chunks, with definitions and channels in these."""
     with source.open("rb") as stream, target.open("wb") as out:
-        writer = Writer(out)
+        writer = Writer(out, chunk_size=chunk_bytes)
         writer.start("ros2", "other")
         ids: dict[str, int] = {}
         for schema, channel, message in make_reader(stream).iter_messages():

@@ -236,13 +236,13 @@ class Stage:
     """One step of the pipeline: what it reads and writes, its configuration and its code.
 
     The first channel of `reads` is the primary one: each of its messages makes a bundle, and a log must have it;
-    `thinned` lets --image-rate and --every leave out some of them. Channels of `reads` that are `optional`, too, are
-    read where they are there, and no other stage is run to make them. A channel of `writes` gets its own topic, or the
-    one that its function in `places` gives. `config` is a dataclass type; `settle` leaves nothing of one to the
-    machine, so that keys tell what ran. `resources` are files that the runner opens, hashes and passes in, `options`
-    may be missing; what a function in `choices` makes of what was given counts. `tolerance` says how far each field of
-    `diff` may be off on another machine; a number is absolute. What packages bring to the registries `extensible` takes
-    part in the results.
+    `thinned` lets --image-rate and --every leave out some of them. `in_segments`, of a stage that makes of each bundle
+    what it would alone, gives the configuration for workers on some of them. Channels of `reads` that are `optional`,
+    too, are read where they are there, and no other stage is run to make them. A channel of `writes` gets its own
+    topic, or the one that its function in `places` gives. `settle` leaves nothing of a configuration to the machine, so
+    that keys tell what ran. `resources` are files that the runner opens, hashes and passes in, `options` may be
+    missing; what a function in `choices` makes of what was given counts. `tolerance` says how far each field of `diff`
+    may be off on another machine; a number is absolute. Registries that are `extensible` take part in the results.
     """
 
     name: str
@@ -257,6 +257,7 @@ class Stage:
     options: tuple[str, ...] = ()
     choices: Mapping[str, Choose] = field(default_factory=dict)
     settle: Callable[[Any], Any] | None = None
+    in_segments: Callable[[Any], Any] | None = None
     tolerance: Mapping[str, float | Tolerance] = field(default_factory=dict)
     extensible: tuple[Registry[object], ...] = ()
 

@@ -97,6 +97,12 @@ class LayeredLog:
         """What could not be read so far."""
         return list(dict.fromkeys(loss for layer in self.layers for loss in layer.recording.losses))
 
+    def times_ns(self) -> tuple[int | None, int | None]:
+        """The first and the last log time of all layers' recordings, None where they hold no messages."""
+        firsts = [layer.recording.start_ns for layer in self.layers if layer.recording.start_ns is not None]
+        lasts = [layer.recording.end_ns for layer in self.layers if layer.recording.end_ns is not None]
+        return min(firsts, default=None), max(lasts, default=None)
+
     def messages(
         self,
         connections: Collection[Connection] | None = None,

@@ -64,6 +64,8 @@ class Reading:
     dropped: Counter[str] = field(default_factory=Counter)
     losses: list[str] = field(default_factory=list)
     unreadable: Counter[str] = field(default_factory=Counter)
+    useless: int = 0
+    """Bundles of whose message a stage could make nothing, such as an image that is damaged."""
     topics: dict[str, str] = field(default_factory=dict)
     """The log's own topic for a channel's."""
     shifts_ns: dict[int, int] = field(default_factory=dict)

@@ -19,6 +19,7 @@ from mcap_landmarks.manifest import RECORDING, StageRecord, code_hash, entry_tex
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.runs.bundles import Span
 from mcap_landmarks.runs.recorded_log import RecordedLog
+from mcap_landmarks.runs.segment_tasks import Segments
 from mcap_landmarks.runs.thinning import Thinning
 from mcap_landmarks.stage import Channel, Config, Reduction, Stage
 from mcap_landmarks.stages import STAGES, find_stage
@@ -30,7 +31,7 @@ class Request:
 
     `use` names the stages that are wanted where several write the same channel. `force` runs every stage anew, whatever
     results there are. `overwrite` lets the output replace what is no earlier result. `config_file` is where settings
-    were read, and is no more to be replaced than the other files.
+    were read, and is no more to be replaced than the other files. With `segments` workers run what can be cut.
     """
 
     recording: Location
@@ -43,6 +44,7 @@ class Request:
     force: bool = False
     overwrite: bool = False
     config_file: Location | None = None
+    segments: Segments | None = None
 
     def reads(self) -> list[Location]:
         """The files that are read, as far as they were named."""

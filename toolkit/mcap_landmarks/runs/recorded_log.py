@@ -30,6 +30,11 @@ class RecordedLog:
         self.choice = span.choice
         self._videos = videos_of(recording, span.choice)
 
+    @property
+    def has_videos(self) -> bool:
+        """Whether some images build on those before them."""
+        return bool(self._videos)
+
     def without_results(self) -> LayeredLog:
         """Its own messages."""
         return self.layered([self.own])

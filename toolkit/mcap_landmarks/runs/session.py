@@ -23,6 +23,7 @@ from mcap_landmarks.recording.layered_log import Layer, LayeredLog, result_layer
 from mcap_landmarks.recording.reader import Recording, open_recording
 from mcap_landmarks.runs.plan import Request, Step
 from mcap_landmarks.runs.recorded_log import RecordedLog
+from mcap_landmarks.runs.segmented_stage import run_in_segments
 from mcap_landmarks.runs.stage_input import StageInput
 from mcap_landmarks.runs.stage_runner import run_stage
 
@@ -150,9 +151,14 @@ class Session:
         began = time.perf_counter()
         log = StageInput(step.stage, self.log_for(step.record), self.request.span, self.examiner)
         with watch(f"{name} {self.log.path.name}", log.count, "bundles") as progress:
-            record = run_stage(step, log, self.request.thinning, target, progress)
+            run = run_stage if self._in_one_piece(step) else run_in_segments
+            record = run(step, log, self.request, target, progress)
         self._show(result_layers(self._open(target)))
         return StageRun(name, "ran", reason, record.outcome, time.perf_counter() - began)
+
+    def _in_one_piece(self, step: Step) -> bool:
+        """Whether this process runs a stage over the whole log."""
+        return self.request.segments is None or step.stage.in_segments is None or self.log.has_videos
 
     def _check_files(self, step: Step, reason: str) -> None:
         lacking = [name for name in step.stage.resources if name not in step.files]

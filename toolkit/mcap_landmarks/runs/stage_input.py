@@ -2,9 +2,9 @@
 
 import contextlib
 import copy
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
-from typing import Self
+from typing import Any, Self
 
 from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, DETECTIONS, ODOMETRY, TF_STATIC
 from mcap_landmarks.errors import MessageError, RecordingError, UsageError
@@ -20,7 +20,7 @@ from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.layered_log import LayeredLog
 from mcap_landmarks.recording.odometry_track import odometry_from
 from mcap_landmarks.runs.bundles import Correction, Reading, Span, decoded, held_before, inputs_of, read_bundles
-from mcap_landmarks.runs.thinning import Thinning, thin
+from mcap_landmarks.runs.thinning import Thinning, thin, thinned_before
 from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage, Reduction, Stage
 
 _EVERY_MESSAGE = Thinning()
@@ -70,14 +70,18 @@ class StageInput:
                     return message
         return None
 
-    def bundles(self, progress: Progress, thinning: Thinning = _EVERY_MESSAGE) -> Iterator[Bundle]:
+    def bundles(
+        self, progress: Progress, thinning: Thinning = _EVERY_MESSAGE, began: Mapping[str, Any] | None = None
+    ) -> Iterator[Bundle]:
         """The bundles, without those that `thinning` leaves out; `progress` is told of each message that makes one.
+
+        `began` is how far thinning had come before, as `thinned_before` tells.
 
         Raises:
             UsageError: messages are to be left out by motion, and there is no odometry.
         """
         self.reading.dropped.update(self._odometry.dropped)
-        raws = chain(held_before(self._log, self._inputs, self._span.start_ns), self._raws(progress, thinning))
+        raws = chain(held_before(self._log, self._inputs, self._span.start_ns), self._raws(progress, thinning, began))
         return read_bundles(raws, self._inputs, self._reads, self.reading, self._correction, self._seeds())
 
     def by_frame(self) -> dict[str, Self]:
@@ -89,9 +93,26 @@ class StageInput:
                 one.primary = connection
         return found
 
-    def close(self) -> None:
-        """Sum up what became of the messages, when all of them were read."""
-        self.reading.close(self._log.losses)
+    def times_ns(self) -> tuple[int, int] | None:
+        """The first and the last log time that a message can have; None where there is none."""
+        first, last = self._log.times_ns()
+        if first is None or last is None:
+            return None
+        start_ns, end_ns = self.within(first, last + 1)
+        return (start_ns, end_ns - 1) if start_ns < end_ns else None
+
+    def within(self, start_ns: int, end_ns: int) -> tuple[int, int]:
+        """The part of a stretch of log time that is read."""
+        own_start, own_end = self._span.start_ns, self._span.end_ns
+        return max(start_ns, own_start or 0), end_ns if own_end is None else min(end_ns, own_end)
+
+    def damage(self) -> list[str]:
+        """What the log lost by damage, as far as it was read."""
+        return self._log.losses
+
+    def close(self, damage: Sequence[str] | None = None) -> None:
+        """Sum up what became of the messages, when all of them were read; by others, if they tell of its `damage`."""
+        self.reading.close(self.damage() if damage is None else damage)
 
     def _images(self) -> dict[Connection, CameraImages]:
         """The images that the log's CameraInfos go with."""
@@ -148,12 +169,29 @@ class StageInput:
                 first = raw._replace(log_time_ns=start_ns)
                 yield from decoded([first], self._inputs, Reading(), self._correction)
 
-    def _raws(self, progress: Progress, thinning: Thinning) -> Iterator[RawMessage]:
+    def thinned_before(self, thinning: Thinning, times_ns: Sequence[int]) -> list[dict[str, Any]]:
+        """How far thinning has come at each of some rising log times; see `thinning.thinned_before`.
+
+        Raises:
+            UsageError: see `bundles`.
+        """
+        odometry = self._followed(thinning)
+        raws = self._log.messages({*self._primaries, *odometry}, self._span.start_ns, self._span.end_ns)
+        return thinned_before(raws, self._primaries, odometry, thinning, times_ns)
+
+    def _followed(self, thinning: Thinning) -> Sequence[Connection]:
+        """The odometry that has a say in what is left out."""
         odometry = choose(self._log, ODOMETRY, self._span.choice) if thinning.by_motion else ()
         if thinning.by_motion and not odometry:
             raise UsageError(f"{self.path}: --every needs odometry, and there is none; use --image-rate")
+        return odometry
+
+    def _raws(self, progress: Progress, thinning: Thinning, began: Mapping[str, Any] | None) -> Iterator[RawMessage]:
+        odometry = self._followed(thinning)
         raws = self._counted({*self._inputs, *odometry}, progress)
-        return thin(raws, self._primaries, odometry, thinning, self.reading.dropped) if thinning.options() else raws
+        if not thinning.options():
+            return raws
+        return thin(raws, self._primaries, odometry, thinning, self.reading.dropped, began)
 
     def _counted(self, wanted: set[Connection], progress: Progress) -> Iterator[RawMessage]:
         for raw in self._log.messages(wanted, self._span.start_ns, self._span.end_ns):

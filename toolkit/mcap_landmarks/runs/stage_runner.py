@@ -1,7 +1,7 @@
 """One stage over what it reads of a log: its results as a recording of their own."""
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from mcap_landmarks.errors import RecordingError, UsageError
@@ -9,40 +9,58 @@ from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import RUN, Manifest, Outcome, StageRecord
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.progress import Progress
-from mcap_landmarks.recording.writer import create_recording
+from mcap_landmarks.recording.writer import RecordingWriter, create_recording
 from mcap_landmarks.runs.bundles import Reading
 from mcap_landmarks.runs.original_stamps import as_stamped
-from mcap_landmarks.runs.plan import Step
+from mcap_landmarks.runs.plan import Request, Step
 from mcap_landmarks.runs.stage_input import StageInput
 from mcap_landmarks.runs.tallies import tally
-from mcap_landmarks.runs.thinning import Thinning
-from mcap_landmarks.stage import Channel, Config, LeftOut, Omission, Stage, Stamped
+from mcap_landmarks.stage import Bundle, Channel, Config, LeftOut, Omission, Stage, Stamped
 
 
-def run_stage(step: Step, log: StageInput, thinning: Thinning, target: Path, progress: Progress) -> StageRecord:
+def run_stage(step: Step, log: StageInput, request: Request, target: Path, progress: Progress) -> StageRecord:
     """Run a stage over a log; its results, with the record that is returned, become the recording `target`.
 
     Raises:
         ToolkitError: the log or a file cannot be used; nothing is left behind.
     """
-    stage, counts = step.stage, Counter[str]()
-    writes, notes = _writes(stage, log, step.config)
+    stage = step.stage
     with create_recording(target, is_passing=True) as writer:
-        bundles = log.bundles(progress, thinning) if stage.thinned else log.bundles(progress)
-        for result in naming(log.path, stage.process(bundles, step.config, step.files)):
-            if isinstance(result, Omission):
-                _omit(result, log)
-                continue
-            channel = writes.get((result.channel, result.frame_id)) or writes.get((result.channel, ""))
-            if channel is not None:
-                counts.update(tally(result.message))
-                shift_ns = log.reading.shifts_ns.get(result.log_time_ns, 0)
-                writer.add(Stamped(channel, result.log_time_ns, as_stamped(result.message, shift_ns)), stage.name)
-        log.close()
-        _check_read(log)
-        record = step.record.with_outcome(outcome_of(log.reading, counts, (*log.notes, *notes)))
+        bundles = log.bundles(progress, request.thinning) if stage.thinned else log.bundles(progress)
+        counts = write_results(step, log, bundles, writer)
+        record = record_with_outcome(step, log, counts)
         writer.metadata[RUN] = Manifest("part", fingerprint=record.key, stages=(record,)).entries()
     return record
+
+
+def write_results(step: Step, log: StageInput, bundles: Iterable[Bundle], writer: RecordingWriter) -> Counter[str]:
+    """Write what a stage makes of bundles; its results by kind."""
+    stage, counts = step.stage, Counter[str]()
+    writes, _ = _writes(stage, log, step.config)
+    for result in naming(log.path, stage.process(bundles, step.config, step.files)):
+        if isinstance(result, Omission):
+            _omit(result, log)
+            continue
+        channel = writes.get((result.channel, result.frame_id)) or writes.get((result.channel, ""))
+        if channel is not None:
+            counts.update(tally(result.message))
+            shift_ns = log.reading.shifts_ns.get(result.log_time_ns, 0)
+            writer.add(Stamped(channel, result.log_time_ns, as_stamped(result.message, shift_ns)), stage.name)
+    return counts
+
+
+def record_with_outcome(
+    step: Step, log: StageInput, counts: Counter[str], damage: Sequence[str] | None = None
+) -> StageRecord:
+    """The record of a stage when all of a log was read; `damage` is what others found of it who did that.
+
+    Raises:
+        RecordingError: no message could be read that a bundle is made of, or no bundle used.
+    """
+    _, notes = _writes(step.stage, log, step.config)
+    log.close(damage)
+    _check_read(log)
+    return step.record.with_outcome(outcome_of(log.reading, counts, (*log.notes, *notes)))
 
 
 def _check_read(log: StageInput) -> None:
@@ -54,6 +72,8 @@ def _check_read(log: StageInput) -> None:
     reading = log.reading
     if reading.losses and not reading.association.bundles:
         raise RecordingError(f"{log.path}: not one message of {log.primary.topic} could be read: {reading.losses[0]}")
+    if reading.useless and reading.useless == reading.association.bundles:
+        raise RecordingError(f"{log.path}: none of {reading.useless} images could be read: {reading.losses[0]}")
 
 
 def outcome_of(reading: Reading, counts: Counter[str] | None = None, notes: tuple[str, ...] = ()) -> Outcome:
@@ -75,6 +95,7 @@ def _omit(omission: Omission, log: StageInput) -> None:
     if omission.lost:
         source = log.by_frame().get(omission.frame_id, log)
         log.reading.lose(source.primary.topic, omission.log_time_ns, omission.reason)
+        log.reading.useless += 1
     else:
         log.reading.dropped[omission.reason] += 1
 

@@ -3,8 +3,9 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -72,22 +73,67 @@ def thin(
     odometry: Collection[Connection],
     thinning: Thinning,
     dropped: Counter[str],
+    began: Mapping[str, Any] | None = None,
 ) -> Iterator[RawMessage]:
     """The messages without the images that nobody wants, which are counted in `dropped`; nothing else is left out.
 
     The rate is kept on the mean, by log time, and jitter costs no images. Motion is that of the latest odometry before
     an image; as long as there is none, every image is taken. Each of several topics of images is thinned by itself.
+    What `thinned_before` tells of the messages before is where it `began`.
     """
-    rates = {entry.topic: _Rate(thinning.rate_hz) for entry in images} if thinning.rate_hz else {}
-    motion = _Motion(thinning) if thinning.by_motion else None
+    thinner = _Thinner(images, odometry, thinning, began)
     for raw in raws:
-        if motion and raw.connection in odometry:
-            motion.follow(raw)
-        reason = _take(raw, rates.get(raw.connection.topic), motion) if raw.connection in images else None
+        reason = thinner.take(raw)
         if reason is None:
             yield raw
         else:
             dropped[reason] += 1
+
+
+def thinned_before(
+    raws: Iterable[RawMessage],
+    images: Collection[Connection],
+    odometry: Collection[Connection],
+    thinning: Thinning,
+    times_ns: Sequence[int],
+) -> list[dict[str, Any]]:
+    """How far thinning has come, in JSON values, before the messages from each of some rising log times on."""
+    thinner, found = _Thinner(images, odometry, thinning, None), list[dict[str, Any]]()
+    for raw in raws:
+        while len(found) < len(times_ns) and raw.log_time_ns >= times_ns[len(found)]:
+            found.append(thinner.state())
+        thinner.take(raw)
+    return found + [thinner.state() for _ in times_ns[len(found) :]]
+
+
+class _Thinner:
+    """What was taken so far, and whether to take the next."""
+
+    def __init__(
+        self,
+        images: Collection[Connection],
+        odometry: Collection[Connection],
+        thinning: Thinning,
+        began: Mapping[str, Any] | None,
+    ) -> None:
+        self._images, self._odometry = images, odometry
+        rates, motion = (began["rates"], began["motion"]) if began else ({}, None)
+        topics = {entry.topic for entry in images} if thinning.rate_hz else ()
+        self._rates = {topic: _Rate(thinning.rate_hz or 1.0, *rates.get(topic, ())) for topic in topics}
+        self._motion = _Motion(thinning, motion) if thinning.by_motion else None
+
+    def take(self, raw: RawMessage) -> str | None:
+        """Take a message, or say why not."""
+        if self._motion and raw.connection in self._odometry:
+            self._motion.follow(raw)
+        if raw.connection not in self._images:
+            return None
+        return _take(raw, self._rates.get(raw.connection.topic), self._motion)
+
+    def state(self) -> dict[str, Any]:
+        """Where to begin from here on."""
+        rates = {topic: rate.state() for topic, rate in self._rates.items()}
+        return {"rates": rates, "motion": self._motion.state() if self._motion else None}
 
 
 def _take(raw: RawMessage, rate: "_Rate | None", motion: "_Motion | None") -> str | None:
@@ -106,10 +152,13 @@ def _take(raw: RawMessage, rate: "_Rate | None", motion: "_Motion | None") -> st
 class _Rate:
     """A grid of moments from the first image on; each takes the first image that is nearest to it of them all."""
 
-    def __init__(self, rate_hz: float) -> None:
+    def __init__(self, rate_hz: float, start_ns: int | None = None, taken: int = -1) -> None:
         self._period_ns = round(1e9 / rate_hz)
-        self._start_ns: int | None = None
-        self._taken = -1
+        self._start_ns = start_ns
+        self._taken = taken
+
+    def state(self) -> tuple[int | None, int]:
+        return self._start_ns, self._taken
 
     def is_due(self, time_ns: int) -> bool:
         return self._nearest(time_ns) > self._taken
@@ -126,10 +175,15 @@ class _Rate:
 class _Motion:
     """How far the robot has come since the last image of a topic that was taken."""
 
-    def __init__(self, thinning: Thinning) -> None:
+    def __init__(self, thinning: Thinning, began: Mapping[str, Any] | None = None) -> None:
         self._thinning = thinning
-        self._now: Array | None = None
-        self._taken: dict[str, Array | None] = {}
+        now, taken = (began["now"], began["taken"]) if began else (None, {})
+        self._now = _pose(now)
+        self._taken = {topic: _pose(pose) for topic, pose in taken.items()}
+
+    def state(self) -> dict[str, Any]:
+        taken = {topic: None if pose is None else pose.tolist() for topic, pose in self._taken.items()}
+        return {"now": None if self._now is None else self._now.tolist(), "taken": taken}
 
     def follow(self, raw: RawMessage) -> None:
         try:
@@ -149,3 +203,7 @@ class _Motion:
 
     def take(self, topic: str) -> None:
         self._taken[topic] = self._now
+
+
+def _pose(values: Sequence[float] | None) -> Array | None:
+    return None if values is None else np.array(values, dtype=np.float64)

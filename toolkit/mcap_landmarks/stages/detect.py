@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from mcap_landmarks.channels import ANNOTATIONS, CAMERA_IMAGE, DETECTIONS, annotations_topic
-from mcap_landmarks.errors import MessageError, RecordingError, UsageError
+from mcap_landmarks.errors import MessageError, UsageError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.codec import Message
 from mcap_landmarks.messages.detections import Detections
@@ -42,7 +43,6 @@ def process(
 
     Raises:
         ModelError: a model is not what it should be.
-        RecordingError: not one of the images could be read.
     """
     if config.method == "thesis":
         config = config.as_in_the_thesis()
@@ -53,20 +53,19 @@ def process(
         raise UsageError(f"{detector.path}: the thesis's method has an input of 640 x 640; export the model with that")
     above = thresholds(detector, config)
     classifier = _classifier(resources.get("classifier"), detector, config)
-    read = failed = 0
-    error: MessageError | None = None
     for bundle, result in _through(bundles, detector, config):
-        read += 1
         if isinstance(result, MessageError):
-            failed, error = failed + 1, error or result
             frame_id = getattr(bundle.messages[CAMERA_IMAGE], "frame_id", "")
             yield Omission(bundle.log_time_ns, str(result), lost=True, frame_id=frame_id)
             continue
         rgb, prepared, outputs = result
         found = find(outputs, prepared, detector, above, config)
         yield from _messages(bundle, found, _verdicts(found, rgb, detector, classifier, config))
-    if error is not None and failed == read:
-        raise RecordingError(f"none of {read} images could be read: {error}")
+
+
+def on_one_thread(config: DetectConfig) -> DetectConfig:
+    """The configuration for one of several workers on a machine: images are looked at one after the other."""
+    return replace(config, threads=1)
 
 
 def _through(bundles: Iterable[Bundle], detector: Detector, config: DetectConfig) -> Iterator[tuple[Bundle, _Looked]]:
@@ -141,6 +140,7 @@ STAGE = Stage(
     config=DetectConfig,
     process=process,
     thinned=True,
+    in_segments=on_one_thread,
     places={ANNOTATIONS: annotations_topic},
     resources=("model",),
     options=("names", "classifier"),
