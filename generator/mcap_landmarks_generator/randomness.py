@@ -19,6 +19,8 @@ class Stream(IntEnum):
     CAMERA_DELIVERY = 9
     LIDAR_DELIVERY = 10
     ODOMETRY_DELIVERY = 11
+    LENS = 12
+    HUNT = 13
 
 
 def draws(seed: int, stream: Stream, index: int = 0) -> np.random.Generator:

@@ -45,7 +45,7 @@ class Photographer:
         """The messages of one image."""
         rendered = self._renderer.draw(job.view)
         detections = true_detections(rendered, self._renderer, job.view, job.stamp_ns)
-        exposed = self._optics.expose(rendered.image, job.index, job.turn_radps)
+        exposed = self._optics.expose(rendered.image, job.index, job.turn_radps, job.view.time_s)
         image = CompressedImage(job.stamp_ns, OPTICAL_FRAME, "jpeg", self._optics.jpeg(exposed))
         info = self._intrinsics.info(job.stamp_ns)
         return (

@@ -74,6 +74,14 @@ class CameraSpec(SensorSpec):
     """Standard deviation of the lens's blur."""
     noise: NotNegative = 2.0
     """Standard deviation of the sensor's noise, in grey levels of 255."""
+    vignetting: Share = 0.0
+    """Share of the light that the lens loses in the corners of the image."""
+    exposure_hunt: Share = 0.0
+    """How far the brightness swings about the right one, as a share, while the camera looks for it."""
+    white_balance_hunt: Share = 0.0
+    """How far red and blue swing against green, as a share, while the camera looks for the colour of the light."""
+    dirt: Annotated[int, Field(ge=0, le=100)] = 0
+    """Specks of dirt on the lens, each a blurred shade of about a thirtieth of the image's width."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -201,3 +201,31 @@ def test_objects_that_walk_are_seen_where_they_are(stage_text: StageText) -> Non
             centres.append((box[0] + box[2]) / 2)
     expected = 320 - 530.5 * np.array([2.0, 1.0, -2.0, 0.0]) / (6.0 - CAMERA_IN_BASE_M[0])
     assert centres == pytest.approx(expected, abs=12)
+
+
+def test_the_lens_takes_light_from_corners_and_behind_dirt() -> None:
+    grey = np.full((120, 160, 3), 200, np.uint8)
+    bare = CameraSpec(width_px=160, height_px=120, noise=0.0, exposure_jitter=0.0)
+    dark = CameraSpec(width_px=160, height_px=120, noise=0.0, exposure_jitter=0.0, vignetting=0.5)
+    taken = Optics(dark, 100.0, 1).expose(grey, 0, 0.0)
+    assert taken[60, 80, 0] == 200
+    assert taken[0, 0, 0] == pytest.approx(100, abs=2)
+    dirty = CameraSpec(width_px=160, height_px=120, noise=0.0, exposure_jitter=0.0, dirt=3)
+    specks = Optics(dirty, 100.0, 1).expose(grey, 0, 0.0)
+    assert specks.min() < 130
+    assert (specks > 190).mean() > 0.9
+    np.testing.assert_array_equal(specks, Optics(dirty, 100.0, 1).expose(grey, 7, 0.0, 3.0))  # dirt stays where it is
+    np.testing.assert_array_equal(Optics(bare, 100.0, 1).expose(grey, 0, 0.0), grey)
+
+
+def test_exposure_and_white_balance_swing_with_time() -> None:
+    grey = np.full((120, 160, 3), 120, np.uint8)
+    plain = {"width_px": 160, "height_px": 120, "noise": 0.0, "exposure_jitter": 0.0}
+    bright, colour = (
+        np.array([Optics(spec, 100.0, 2).expose(grey, 0, 0.0, time_s)[0, 0] for time_s in np.arange(0, 40, 0.3)], int)
+        for spec in (CameraSpec(**plain, exposure_hunt=0.3), CameraSpec(**plain, white_balance_hunt=0.2))
+    )
+    assert (bright[:, 0] == bright[:, 2]).all()
+    assert (bright[:, 1].min(), bright[:, 1].max()) == (pytest.approx(84, abs=3), pytest.approx(156, abs=3))
+    assert (colour[:, 1] == 120).all()
+    assert np.abs(colour[:, 0] - colour[:, 2]).max() > 20
