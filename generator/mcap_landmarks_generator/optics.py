@@ -29,7 +29,7 @@ class Optics:
         noise = draws(seed, Stream.IMAGE_NOISE).standard_normal(size, dtype=np.float32) * spec.noise
         self._noise = np.rint(noise).astype(np.int16)
         self._lens = _lens(spec, seed)
-        self._phases = draws(seed, Stream.HUNT).uniform(0, 2 * np.pi, (3, len(_HUNT_PERIODS_S)))
+        self._phases = draws(seed, Stream.HUNT).uniform(0, 2 * np.pi, (2, len(_HUNT_PERIODS_S)))
 
     def expose(self, image: Image, index: int, turn_radps: float, time_s: float = 0.0) -> Image:
         """The image (H, W, 3) as the sensor gives it, taken at a time after the start while the camera turned at
@@ -54,9 +54,11 @@ class Optics:
     def _swings(self, time_s: float) -> Floats:
         """Gains (3,) of red, green and blue at a time after the start."""
         turns = 2 * np.pi * time_s / np.array(_HUNT_PERIODS_S)
-        light, red, blue = np.sin(turns + self._phases).mean(axis=1)
-        colours = np.array([1 + self._spec.white_balance_hunt * red, 1.0, 1 + self._spec.white_balance_hunt * blue])
-        swings: Floats = (1 + self._spec.exposure_hunt * light) * colours
+        light, warmth = np.sin(turns + self._phases).mean(axis=1) * (
+            self._spec.exposure_hunt,
+            self._spec.white_balance_hunt,
+        )
+        swings: Floats = (1 + light) * np.array([1 + warmth, 1.0, 1 - warmth])
         return swings
 
     def jpeg(self, image: Image) -> bytes:

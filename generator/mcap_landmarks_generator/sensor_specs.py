@@ -79,7 +79,7 @@ class CameraSpec(SensorSpec):
     exposure_hunt: Share = 0.0
     """How far the brightness swings about the right one, as a share, while the camera looks for it."""
     white_balance_hunt: Share = 0.0
-    """How far red and blue swing against green, as a share, while the camera looks for the colour of the light."""
+    """How far red swings against blue, as a share, while the camera looks for the colour of the light."""
     dirt: Annotated[int, Field(ge=0, le=100)] = 0
     """Specks of dirt on the lens, each a blurred shade of about a thirtieth of the image's width."""
 
