@@ -47,7 +47,7 @@ def command(
     try:
         from mcap_landmarks.diff.set_logs import is_set
 
-        if is_set(before) or is_set(after) or sets.blessed is not None:
+        if sets.blessed is not None or is_set(before) or is_set(after):
             if any((tolerance, align, drives is not None)):
                 raise UsageError("--tolerance, --align and --drives are of two files; folders have --criteria")
             code = diff_folders(before, after, sets, fail_on or [], reference, json=json)
