@@ -49,6 +49,10 @@ class _Handler(BaseHTTPRequestHandler):
         self._served = served
         super().__init__(*arguments)  # type: ignore[arg-type] # what the server gives it
 
+    def handle(self) -> None:
+        with contextlib.suppress(ConnectionResetError):  # who asked wants no more of the answer
+            super().handle()
+
     def log_message(self, *_: object) -> None:
         pass
 

@@ -133,6 +133,17 @@ def to_read(place: Location) -> Path:
     return place
 
 
+def open_to_read(place: Location) -> BinaryIO:
+    """A file, for reading; of one elsewhere only what is read is fetched.
+
+    Raises:
+        OSError: a path cannot be read.
+        UsageError: it is a pipe or device; or see `Url.open`.
+        RemoteError: see `Url.open`.
+    """
+    return (to_read(place) if isinstance(place, Path) else place).open("rb")
+
+
 def size_of(place: Location) -> int:
     """Bytes of a file; 0 where there is none on this machine, since opening it says what is wrong.
 

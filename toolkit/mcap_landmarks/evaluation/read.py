@@ -19,7 +19,7 @@ from mcap_landmarks.evaluation import tum
 from mcap_landmarks.evaluation.collected import COLUMNAR, ONCE, Collected
 from mcap_landmarks.evaluation.metrics import NOWHERE, Reference, RunResult
 from mcap_landmarks.evaluation.trajectory import Trajectory
-from mcap_landmarks.locations import Location, to_read
+from mcap_landmarks.locations import Location, open_to_read
 from mcap_landmarks.maps.database import read_map
 from mcap_landmarks.maps.exchange import read_text
 from mcap_landmarks.maps.exchange_thesis import parse_results
@@ -87,7 +87,7 @@ def _appendix_d(path: Location) -> tuple[RunResult, Reference]:
 def is_database(path: Location) -> bool:
     """Whether a file is, or by its name should be, a landmark database."""
     try:
-        with to_read(path).open("rb") as stream:
+        with open_to_read(path) as stream:
             return path.suffix == ".db" or stream.read(15) == b"SQLite format 3"
     except OSError:
         return path.suffix == ".db"  # opening it says what is wrong

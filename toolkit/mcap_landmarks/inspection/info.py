@@ -4,7 +4,6 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 
 from mcap_landmarks.channels import MAP_POSE, MATCH, POSE, TRUTH_DETECTIONS, TRUTH_OBJECTS, TRUTH_POSE
 from mcap_landmarks.config import Settings
@@ -18,7 +17,7 @@ from mcap_landmarks.inspection.odometry_checks import examined_odometry
 from mcap_landmarks.inspection.open_logs import OpenLog, open_logs
 from mcap_landmarks.inspection.survey import survey
 from mcap_landmarks.inspection.topic_roles import ROLES, Role, could_be, topics_for
-from mcap_landmarks.locations import Location
+from mcap_landmarks.locations import Location, is_folder
 from mcap_landmarks.manifest import is_generated
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.networks.choice import choose_network
@@ -66,7 +65,7 @@ class LogInfo:
     None where it has none or no network fits; it is told with the findings.
     """
 
-    path: Path
+    path: Location
     name: str
     profile: str
     start_ns: int | None
@@ -91,7 +90,7 @@ class LogInfo:
     @property
     def is_recording(self) -> bool:
         """Whether it is a file that verbs read as it is; bags and data sets are converted first."""
-        return self.path.suffix == ".mcap" and self.path.is_file()
+        return self.path.suffix == ".mcap" and not is_folder(self.path)
 
 
 def describe(place: Location, settings: Settings, watch: Watch | None = None) -> list[LogInfo]:

@@ -3,12 +3,11 @@
 import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from mcap_landmarks.config import Settings, stage_config
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.inspection.mcap_log import McapLog, MountLog
-from mcap_landmarks.locations import Location, to_read
+from mcap_landmarks.locations import Location, Url, is_folder, to_read
 from mcap_landmarks.sources import (
     BagDescription,
     Log,
@@ -24,7 +23,8 @@ from mcap_landmarks.stage import Config
 class OpenLog:
     """One log: where it comes from, its parts, and what is known of them before they are read."""
 
-    path: Path
+    path: Location
+    is_folder: bool
     name: str
     source: str
     config: Config
@@ -48,7 +48,7 @@ class OpenLog:
     def only_file(self) -> "McapLog | None":
         """The MCAP file that the whole log is, None where it is a folder or of another format."""
         found = [part for part in self.parts if not isinstance(part, MountLog)]
-        first = found[0] if len(found) == 1 and self.path.is_file() else None
+        first = found[0] if len(found) == 1 and not self.is_folder else None
         return first if isinstance(first, McapLog) else None
 
     def all_notes(self) -> tuple[str, ...]:
@@ -72,16 +72,33 @@ def open_logs(place: Location, settings: Settings) -> Iterator[Sequence[OpenLog]
 
     Raises:
         RecordingError: no source knows it, or it cannot be read.
-        UsageError: it is not on this machine, or a setting of its source is wrong.
+        RemoteError: it is elsewhere, and cannot be read. An MCAP file is read there, all else copied first.
+        UsageError: a setting of its source is wrong.
     """
+    if isinstance(place, Url) and place.suffix == ".mcap" and not is_folder(place):
+        yield [_recording_elsewhere(place, settings)]
+        return
     path = to_read(place)
-    source = source_of(path)
-    config = stage_config(source.config, source.name, settings.get(source.name, {}))
-    with source.open(path, config) as found:
-        yield [_opened(path, source.name, config, log) for log in found]
+    try:
+        source = source_of(path)
+        config = stage_config(source.config, source.name, settings.get(source.name, {}))
+        with source.open(path, config) as found:
+            yield [_opened(place, source.name, config, log, in_folder=path.is_dir()) for log in found]
+    except RecordingError as error:
+        if path is place:
+            raise
+        raise RecordingError(str(error).replace(str(path), str(place))) from error  # not of the copy
 
 
-def _opened(path: Path, source: str, config: Config, log: SourceLog) -> OpenLog:
+def _recording_elsewhere(place: Url, settings: Settings) -> OpenLog:
+    from mcap_landmarks.sources import rosbag2  # noqa: PLC0415 # sources are imported when they are needed
+
+    name = rosbag2.SOURCE.name
+    config = stage_config(rosbag2.Rosbag2Config, name, settings.get(name, {}))
+    return _opened(place, name, config, rosbag2.recording_elsewhere(place, config), in_folder=False)
+
+
+def _opened(place: Location, source: str, config: Config, log: SourceLog, *, in_folder: bool) -> OpenLog:
     """A log with all its parts that can be opened.
 
     Raises:
@@ -98,13 +115,15 @@ def _opened(path: Path, source: str, config: Config, log: SourceLog) -> OpenLog:
         raise RecordingError("; ".join([*log.losses, *map(str, problems)]))
     recordings = [part for part in parts if isinstance(part, McapLog)]
     losses, held = (*log.losses, *map(str, problems)), sum(map(_messages_in, parts))
-    notes = (*log.notes, *_told_counts(path, None if losses else log.messages, held))
+    notes = (*log.notes, *_told_counts(place, None if losses else log.messages, held))
     told = (*log.told, *(recording.about for recording in recordings))
     parts += [mount for recording in recordings for mount in recording.mounts()]
-    return OpenLog(path, log.name, source, config, tuple(parts), log.size_bytes, losses, notes, log.dropped, told)
+    return OpenLog(
+        place, in_folder, log.name, source, config, tuple(parts), log.size_bytes, losses, notes, log.dropped, told
+    )
 
 
-def _told_counts(path: Path, told: int | None, held: int) -> Iterator[str]:
+def _told_counts(path: Location, told: int | None, held: int) -> Iterator[str]:
     if told not in (None, held):
         yield f"{path}: its metadata count {told} messages, its files hold {held}; these were taken"
 

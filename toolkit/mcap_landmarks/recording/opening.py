@@ -1,6 +1,5 @@
 """From a file's name to the index of the recording in it, or to a refusal that names the file."""
 
-from pathlib import Path
 from struct import error as struct_error
 from typing import BinaryIO
 
@@ -8,7 +7,7 @@ from mcap import records
 from mcap.exceptions import McapError
 
 from mcap_landmarks.errors import RecordingError
-from mcap_landmarks.locations import Location, to_read
+from mcap_landmarks.locations import Location, open_to_read
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.container import MAGIC, RECORD, Opcode, parse
 from mcap_landmarks.recording.reading_ahead import gather_ends
@@ -25,7 +24,7 @@ def open_stream(path: Location) -> BinaryIO:
         RemoteError: the same of a file elsewhere.
     """
     try:
-        return (to_read(path) if isinstance(path, Path) else path).open("rb")
+        return open_to_read(path)
     except FileNotFoundError as error:
         raise RecordingError(f"{path}: there is no such file; check the path") from error
     except IsADirectoryError as error:

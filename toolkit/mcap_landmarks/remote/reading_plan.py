@@ -1,6 +1,5 @@
 """Parts of a file in the order in which they will be read: fetched ahead, several at once, within a bound of bytes."""
 
-import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -21,82 +20,87 @@ class _Piece(NamedTuple):
     content: "Future[bytes]"
 
 
-def joined(parts: Iterable[Part]) -> Iterator[Part]:
-    """Parts one after the other, those that nearly touch as one: a request takes longer than to fetch what is between.
+def joined(parts: Iterable[Part]) -> Iterator[tuple[Part, ...]]:
+    """Parts one after the other, those together that nearly touch: a request takes longer than to fetch what is
+    between them.
 
     Only parts in the order of the file are joined, up to `LARGEST_JOINED` bytes.
     """
-    last: Part | None = None
-    for start, end in parts:
-        if last and last[0] <= start <= last[1] + JOINED_GAP and end - last[0] <= LARGEST_JOINED:
-            last = last[0], max(last[1], end)
-        else:
-            if last:
-                yield last
-            last = start, end
-    if last:
-        yield last
+    group: list[Part] = []
+    end = 0
+    for part in parts:
+        is_near = group and group[-1][0] <= part[0] <= end + JOINED_GAP
+        if group and not (is_near and part[1] - group[0][0] <= LARGEST_JOINED):
+            yield tuple(group)
+            group, end = [], 0
+        group.append(part)
+        end = max(end, part[1])
+    if group:
+        yield tuple(group)
 
 
 class ReadingPlan:
     """What will be read of a file next, one part after the other; `fetch` gets one, in a thread of the pool.
 
     Parts are fetched from the first on: no more than `AT_ONCE` that are not there yet, and no more bytes than a part
-    of the bound on memory. One that was passed over is given up.
+    of the bound on memory. One that was passed over is given up. `keep` gets each part that is there.
     """
 
     def __init__(
         self,
         parts: Iterable[Part],
         fetch: Callable[[int, int], bytes],
+        keep: Callable[[int, bytes], None],
         pool: ThreadPoolExecutor,
         most: int = _MOST_AHEAD,
     ) -> None:
-        self._coming, self._fetch, self._pool = joined(parts), fetch, pool
+        self._coming, self._fetch, self._keep, self._pool = joined(parts), fetch, keep, pool
         self._next = next(self._coming, None)
         self._pieces: deque[_Piece] = deque()
         self._ahead, self._most = 0, min(most, memory.bound() // 8)
-        self._lock = threading.Lock()
 
     def start(self) -> None:
         """Begin to fetch."""
-        with self._lock:
-            self._go_on()
+        self._go_on()
 
     def covering(self, place: int) -> tuple[int, bytes] | None:
-        """The part that has the byte at a place, and where it begins; waits for it. None if it is not to come.
+        """The piece that has the byte at a place, and where it begins; waits for it. None if it is not to come.
 
         Raises:
             RemoteError: it could not be fetched.
         """
-        with self._lock:
-            found = next((piece for piece in self._pieces if piece.start <= place < piece.end), None)
-            if found is None:
-                return None
-            while self._pieces[0] is not found:
-                passed = self._pieces.popleft()
-                passed.content.cancel()
-                self._ahead -= passed.end - passed.start
-            self._go_on()
+        found = next((piece for piece in self._pieces if piece.start <= place < piece.end), None)
+        if found is None:
+            return None
+        while self._pieces[0] is not found:
+            passed = self._pieces.popleft()
+            passed.content.cancel()
+            self._ahead -= passed.end - passed.start
+        self._go_on()
         content = found.content.result()
-        with self._lock:
-            self._go_on()
+        self._go_on()
         return found.start, content
 
     def close(self) -> None:
         """Fetch nothing more."""
-        with self._lock:
-            self._next = None
-            while self._pieces:
-                self._pieces.popleft().content.cancel()
+        self._next = None
+        while self._pieces:
+            self._pieces.popleft().content.cancel()
+
+    def _get(self, parts: tuple[Part, ...], start: int, end: int) -> bytes:
+        content = self._fetch(start, end)
+        for begin, stop in parts:
+            self._keep(begin, content[begin - start : stop - start])
+        return content
 
     def _go_on(self) -> None:
         """Begin to fetch what comes next, as far as the bounds permit; one piece is always permitted."""
         while self._next is not None:
-            start, end = self._next
+            start, end = self._next[0][0], max(end for _, end in self._next)
             open_requests = sum(not piece.content.done() for piece in self._pieces)
             if self._pieces and (open_requests >= AT_ONCE or self._ahead + end - start > self._most):
                 return
-            self._pieces.append(_Piece(start, end, self._pool.submit(self._fetch, start, end)))
+            content = self._pool.submit(self._get, self._next, start, end)
+            self._pieces.append(_Piece(start, end, content))
             self._ahead += end - start
             self._next = next(self._coming, None)

@@ -44,6 +44,14 @@ class StatusError(OSError):
         self.status = status
 
 
+class WholeOnlyError(Exception):
+    """A web server gives no parts of files, or does not know their size. What it says of this one."""
+
+    def __init__(self, version: str, size: int | None) -> None:
+        super().__init__("the server gives no parts of files")
+        self.version, self.size = version, size
+
+
 @dataclass(frozen=True, slots=True)
 class _Kind:
     """A way to fail: how to tell it, by names of exceptions, numbers of HTTP or words, and what to say of it.
@@ -90,7 +98,6 @@ _KINDS = (
         words=("bucket does not exist", "ContainerNotFound", "container does not exist"),
     ),
     _kind("there is no such file; check the URL", "FileNotFoundError", "ResourceNotFoundError", statuses=(404, 410)),
-    _kind("it is a folder; name a file in it", "IsADirectoryError"),
     _kind(
         "the host cannot be reached{again}; check its name and the network",
         *("EndpointConnectionError", "ConnectTimeoutError", "ProxyConnectionError", "ClientConnectorError"),
@@ -116,11 +123,14 @@ def persistently(text: str, attempt: Callable[[], T], is_closed: threading.Event
 
     Raises:
         RemoteError: it failed for good, or each time.
+        WholeOnlyError: as the class says.
     """
     tries, stop = 1, is_closed or threading.Event()
     while True:
         try:
             return attempt()
+        except WholeOnlyError:
+            raise
         except Exception as error:
             if tries > len(PAUSES_S) or not is_passing(error):
                 raise refusal(text, error, tries) from error

@@ -30,7 +30,7 @@ class RemoteFile(AnnouncedFile):
         self._position = 0
         self._kept = kept_parts.ALL.of(text, stored.version)
         if stored.begin:
-            self._kept.add(0, stored.begin)
+            self._kept.gather(0, stored.begin)
         self._last: tuple[int, bytes] = 0, b""
         self._window = _LEAST
         self._plans: list[ReadingPlan] = []
@@ -84,7 +84,8 @@ class RemoteFile(AnnouncedFile):
     @contextmanager
     def expecting(self, parts: Iterable[Part]) -> Iterator[None]:
         """See `AnnouncedFile`."""
-        plan = ReadingPlan(parts, self._fetch, self._pool)
+        missing = (part for part in parts if not self._kept.has(*part))
+        plan = ReadingPlan(missing, self._fetch, self._kept.read, self._pool)
         plan.start()
         self._plans.append(plan)
         try:
@@ -97,19 +98,13 @@ class RemoteFile(AnnouncedFile):
     def gather(self, parts: Iterable[Part]) -> None:
         """See `AnnouncedFile`."""
         wanted = sorted((max(start, 0), min(end, self._stored.size)) for start, end in parts)
-        missing = [part for part in wanted if part[0] < part[1] and not self._has(*part)]
-        groups = list(joined(missing))
-        with_content = zip(groups, self._pool.map(lambda group: self._fetch(*group), groups), strict=True)
-        number = 0
-        for (begin, end), content in with_content:
-            while number < len(missing) and missing[number][1] <= end:
-                start, stop = missing[number]
-                self._kept.add(start, content[start - begin : stop - begin])
-                number += 1
-
-    def _has(self, start: int, end: int) -> bool:
-        found = self._kept.covering(start)
-        return found is not None and end <= found[0] + len(found[1])
+        groups = list(joined(part for part in wanted if part[0] < part[1] and not self._kept.has(*part)))
+        spans = [(group[0][0], max(end for _, end in group)) for group in groups]
+        for group, (begin, _), content in zip(
+            groups, spans, self._pool.map(lambda span: self._fetch(*span), spans), strict=True
+        ):
+            for start, end in group:
+                self._kept.gather(start, content[start - begin : end - begin])
 
     def _fetch(self, start: int, end: int) -> bytes:
         return persistently(self._text, lambda: self._stored.bytes_of(start, end), self._is_closed)
@@ -141,7 +136,11 @@ class RemoteFile(AnnouncedFile):
         if self._row is not None:
             self._row.close()
         places = [*range(place, size, _MOST_IN_ROW), size]
-        self._row = ReadingPlan(pairwise(places), self._fetch, self._pool, _ROW_AHEAD)
+        self._row = ReadingPlan(pairwise(places), self._fetch, _keep_none, self._pool, _ROW_AHEAD)
         self._row.start()
         found = self._row.covering(place)
         return found if found is not None else (place, self._fetch(place, end))
+
+
+def _keep_none(_start: int, _content: bytes) -> None:
+    """What is read in a row is not read again."""

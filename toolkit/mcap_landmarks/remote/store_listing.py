@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 from mcap_landmarks.errors import RemoteError, UsageError
 from mcap_landmarks.remote.addresses import scheme_of, shown
-from mcap_landmarks.remote.refusals import persistently
-from mcap_landmarks.remote.stored_file import WholeOnlyError, stored_file
+from mcap_landmarks.remote.refusals import WholeOnlyError, persistently
+from mcap_landmarks.remote.stored_file import stored_file
 from mcap_landmarks.remote.stores import Entry, is_web, store
 
 
@@ -36,7 +36,7 @@ def urls_matching(text: str) -> list[str]:
     files = sorted(name for name, entry in found.items() if entry.get("type") == "file" and not name.endswith("/"))
     if not files:
         raise RemoteError(f"{shown(text)}: there is no such file, and none below it; check the URL")
-    return [_beside(text, name) for name in files]
+    return [beside(text, name) for name in files]
 
 
 def urls_below(text: str) -> list[str]:
@@ -66,7 +66,7 @@ def is_url_folder(text: str) -> bool:
     return persistently(text, lambda: file_system.info(path)).get("type") == "directory"
 
 
-def _beside(text: str, name: str) -> str:
-    """The URL of another path in the same bucket, or container; of the latter a URL may name the account, too."""
+def beside(text: str, name: str) -> str:
+    """The URL of another path of a file system in the same bucket or container, named as it is (with its account)."""
     place = text[text.index("://") + 3 :].partition("/")[0]
     return f"{scheme_of(text)}://{place}/{name.strip('/').partition('/')[2]}"

@@ -4,7 +4,8 @@ import threading
 from collections.abc import Callable
 from typing import Protocol, cast
 
-from mcap_landmarks.remote.addresses import scheme_of
+from mcap_landmarks.errors import RemoteError
+from mcap_landmarks.remote.addresses import scheme_of, shown
 from mcap_landmarks.remote.refusals import ChangedError, DroppedError, persistently
 from mcap_landmarks.remote.stores import Entry, FileSystem, is_web, store
 
@@ -27,12 +28,8 @@ class StoredFile(Protocol):
         """
 
 
-class WholeOnlyError(Exception):
-    """A web server gives no parts of files, or does not know their size. What it says of this one."""
-
-    def __init__(self, version: str, size: int | None) -> None:
-        super().__init__("the server gives no parts of files")
-        self.version, self.size = version, size
+class FolderError(RemoteError):
+    """A prefix of files, where a file is meant."""
 
 
 def stored_file(text: str, is_closed: threading.Event) -> StoredFile:
@@ -40,6 +37,7 @@ def stored_file(text: str, is_closed: threading.Event) -> StoredFile:
 
     Raises:
         RemoteError: there is none, or it cannot be read.
+        FolderError: as the class says.
         UsageError: as `store` says.
         WholeOnlyError: as the class says.
     """
@@ -49,16 +47,28 @@ def stored_file(text: str, is_closed: threading.Event) -> StoredFile:
 
         return persistently(text, lambda: WebFile(file_system, text), is_closed)
     kind = _PinnedFile if scheme_of(text) == "s3" else _CheckedFile
-    return persistently(text, lambda: kind(file_system, path), is_closed)
+
+    def open_it() -> StoredFile:
+        try:
+            return kind(file_system, path)
+        except IsADirectoryError as error:
+            raise FolderError(f"{shown(text)}: it is a folder; name a file in it") from error
+
+    return persistently(text, open_it, is_closed)
 
 
-def _version(entry: Entry) -> str:
+def version_in(entry: Entry) -> str:
     """What a store says that changes with a content: by s3fs, gcsfs, adlfs and fsspec's own memory."""
     names = ("ETag", "etag", "generation", "VersionId", "LastModified", "last_modified", "mtime", "created", "size")
     return " ".join(str(value) for name in names if (value := entry.get(name)) is not None)
 
 
-def _size(entry: Entry, path: str) -> int:
+def size_in(entry: Entry, path: str) -> int:
+    """The bytes of a file.
+
+    Raises:
+        IsADirectoryError: it is a folder.
+    """
     if entry.get("type") == "directory":
         raise IsADirectoryError(path)
     return int(cast("int", entry.get("size")))
@@ -71,7 +81,7 @@ class _PinnedFile:
 
     def __init__(self, file_system: FileSystem, path: str) -> None:
         entry = file_system.info(path)
-        self.size, self.version = _size(entry, path), _version(entry)
+        self.size, self.version = size_in(entry, path), version_in(entry)
         opened = file_system.open(path, "rb", cache_type="none")
         self._get: Callable[[int, int], bytes] = opened.cache.fetcher  # type: ignore[attr-defined] # fsspec's files
 
@@ -88,12 +98,12 @@ class _CheckedFile:
     def __init__(self, file_system: FileSystem, path: str) -> None:
         self._file_system, self._path = file_system, path
         entry = file_system.info(path)
-        self.size, self.version = _size(entry, path), _version(entry)
+        self.size, self.version = size_in(entry, path), version_in(entry)
 
     def bytes_of(self, start: int, end: int) -> bytes:
         """See `StoredFile`."""
         found = self._file_system.cat_file(self._path, start, end)
-        if _version(self._file_system.info(self._path)) != self.version:
+        if version_in(self._file_system.info(self._path)) != self.version:
             raise ChangedError
         return _whole(found, start, end)
 

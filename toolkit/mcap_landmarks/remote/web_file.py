@@ -7,8 +7,7 @@ import aiohttp
 from fsspec.asyn import sync
 from yarl import URL
 
-from mcap_landmarks.remote.refusals import ChangedError, DroppedError, StatusError
-from mcap_landmarks.remote.stored_file import WholeOnlyError
+from mcap_landmarks.remote.refusals import ChangedError, DroppedError, StatusError, WholeOnlyError
 from mcap_landmarks.remote.stores import FileSystem
 
 BEGIN = 16 << 10

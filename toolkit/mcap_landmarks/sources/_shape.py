@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from mcap_landmarks.locations import Location
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.stage import ChannelSummary, Config, Connection, RawMessage
 from mcap_landmarks.wording import counted
@@ -125,7 +126,7 @@ class McapFile:
     raises MessageError if the type cannot be understood.
     """
 
-    path: Path
+    path: Location
     carry: Callable[[Connection, Mapping[str, Mapping[str, str]]], Carried]
 
 

@@ -13,6 +13,7 @@ import zstandard
 
 from mcap_landmarks import memory
 from mcap_landmarks.errors import RecordingError
+from mcap_landmarks.locations import Location, size_of
 from mcap_landmarks.sources._bag_folder import SUFFIXES, files_of, single_file, storage_files
 from mcap_landmarks.sources._bag_metadata import METADATA
 from mcap_landmarks.sources._db3 import ZSTD_MAGIC, Db3Log
@@ -79,6 +80,19 @@ def open_bag(path: Path, config: Rosbag2Config) -> Iterator[Sequence[SourceLog]]
         told = ((METADATA, folder.about), *(one.about for one in parts if isinstance(one, Db3Log)))
         notes = tuple(folder.notes)
         yield [SourceLog(name, tuple(parts), size, losses, notes=notes, told=told, messages=folder.messages)]
+
+
+def recording_elsewhere(place: Location, config: Rosbag2Config) -> SourceLog:
+    """The log that an MCAP file elsewhere is, which need not be copied; metadata beside it are not looked for.
+
+    Raises:
+        RemoteError: there is no such file, or it cannot be read.
+        UsageError: as `open_bag`.
+    """
+    if config.distro:
+        check_distribution(config.distro)
+    definitions = Definitions(DefinitionFiles(config.definitions), [config.distro] if config.distro else [])
+    return SourceLog(place.stem, (McapFile(place, partial(carry, definitions)),), size_of(place))
 
 
 def _part(plain: Path, file: Path, definitions: Definitions) -> Log | McapFile:
