@@ -50,7 +50,7 @@ def urls_below(text: str) -> list[str]:
     prefix = f"{path.rstrip('/')}/"
     found = persistently(text, lambda: file_system.find(prefix, detail=True))
     names = (name for name, entry in found.items() if entry.get("type") == "file")
-    return [_beside(text, name) for name in sorted(names) if name.startswith(prefix) and not name.endswith("/")]
+    return [beside(text, name) for name in sorted(names) if name.startswith(prefix) and not name.endswith("/")]
 
 
 def is_url_folder(text: str) -> bool:
