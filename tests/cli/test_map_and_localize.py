@@ -61,11 +61,20 @@ def test_json_documents(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     assert document["stages"] == {"localize": "ran"}
 
 
-def test_a_map_is_the_same_whatever_the_order_of_its_logs(folder: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Logs of half a lap through one world."""
+    here = tmp_path_factory.mktemp("short")
+    for seed, name in enumerate("ab"):
+        write(here / f"{name}.mcap", messages(seed=seed, count=40))
+    return here
+
+
+def test_a_map_is_the_same_whatever_the_order_of_its_logs(short: Path, tmp_path: Path) -> None:
     """To the last byte, with the logs' own results."""
     for name, order in (("one", ("a", "b")), ("other", ("b", "a"))):
         (tmp_path / name).mkdir()
-        logs = [folder / f"{log}.mcap" for log in order]
+        logs = [short / f"{log}.mcap" for log in order]
         assert call("map", *logs, "--map", tmp_path / name / "map.db", "-o", tmp_path / name / "out") == 0
     for name in ("map.db", "out/a.mcap", "out/b.mcap"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
@@ -73,12 +82,12 @@ def test_a_map_is_the_same_whatever_the_order_of_its_logs(folder: Path, tmp_path
 
 @pytest.mark.slow
 def test_a_log_that_does_not_fit_is_left_out_by_name(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    short: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """With exit 3, and again where its map is found; of two logs, both of which may be wrong, there is no map."""
     renamed = {f"tag {i}": f"other {i}" for i in range(15)}
-    strange = write(tmp_path / "strange.mcap", messages(seed=3, renamed=renamed))
-    logs = (folder / "a.mcap", strange, folder / "b.mcap")
+    strange = write(tmp_path / "strange.mcap", messages(seed=3, count=40, renamed=renamed))
+    logs = (short / "a.mcap", strange, short / "b.mcap")
     for state in ("ran", "reused"):
         assert call("map", *logs, "--map", tmp_path / "map.db", "-o", tmp_path / "out", "--json") == 3
         document, told = json.loads((printed := capsys.readouterr()).out), printed.err

@@ -1,5 +1,6 @@
 """Build a landmark map from logs."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -15,6 +16,7 @@ from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.map_results import MappedLog, MapRun
+    from mcap_landmarks.runs.plan import Request
     from mcap_landmarks.runs.session import StageRun
 
 
@@ -37,6 +39,7 @@ def command(
     use: options.Use = None,
     extrinsics: options.Extrinsics = None,
     fixed: options.Fixed = False,
+    collect: Annotated[Path | None, typer.Option("--collect", hidden=True)] = None,
 ) -> None:
     """Build one landmark map from LOG...; with -o also write each log with its results.
 
@@ -48,6 +51,9 @@ def command(
         _from_reference(logs, database, given)
         return
     asked = Given(given, images, scans, {"extrinsics": extrinsics}, use, ["build_map.fixed=true"] * fixed)
+    if collect is not None:
+        _collect(asked.requests(logs), prior, collect, given)
+        return
     from mcap_landmarks.runs.build_map import build_map_of
 
     run = build_map_of(asked.requests(logs), database, output, prior, progress)
@@ -61,6 +67,20 @@ def command(
     else:
         _print(run, database)
     if any(log.outcome.losses or log.excluded for log in run.logs):
+        raise typer.Exit(PARTIAL)
+
+
+def _collect(requests: "list[Request]", prior: Location | None, parts: Path, given: LogOptions) -> None:
+    """Leave what logs give to a map of many in a folder, for `batch map`."""
+    from mcap_landmarks.runs.build_map import collect_for_map
+
+    found = [collect_for_map(request, prior, parts, progress) for request in requests]
+    for log in found:
+        tell(log.recording, log.stages, log.outcome.notes, log.outcome.losses)
+    if given.json:
+        logs = [{"path": str(log.recording), "fingerprint": log.fingerprint, **told(log.stages)} for log in found]
+        say_json("map", {"logs": logs})
+    if any(log.outcome.losses for log in found):
         raise typer.Exit(PARTIAL)
 
 

@@ -2,21 +2,21 @@
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
 from mcap_landmarks.atomic import held
-from mcap_landmarks.errors import MapError, RecordingError
+from mcap_landmarks.errors import MapError
 from mcap_landmarks.locations import Location
-from mcap_landmarks.manifest import Manifest, Outcome
+from mcap_landmarks.manifest import Manifest
 from mcap_landmarks.mapping.built_map import BuiltMap
 from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.maps.database import read_map, write_map
 from mcap_landmarks.progress import Watch, unwatched
-from mcap_landmarks.runs.bundles import Reading
-from mcap_landmarks.runs.map_plan import LogPlan, MapPlan, MapTask, plan_map
+from mcap_landmarks.runs.log_observations import observe
+from mcap_landmarks.runs.map_plan import MapPlan, MapTask, plan_map
 from mcap_landmarks.runs.map_results import (
     VERB,
     MappedLog,
@@ -29,12 +29,9 @@ from mcap_landmarks.runs.map_results import (
 )
 from mcap_landmarks.runs.original_stamps import trajectory_as_stamped
 from mcap_landmarks.runs.outputs import no_empty_folder, output_files
-from mcap_landmarks.runs.pipeline import told
 from mcap_landmarks.runs.plan import Request
 from mcap_landmarks.runs.replacing import check_apart, check_replaceable, earlier_map, earlier_recording
-from mcap_landmarks.runs.session import Session, StageRun, open_session, parts_folder
-from mcap_landmarks.runs.stage_input import StageInput
-from mcap_landmarks.runs.stage_runner import outcome_of
+from mcap_landmarks.runs.session import StageRun, parts_folder
 from mcap_landmarks.stages.build_map import STAGE
 
 
@@ -56,6 +53,16 @@ def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
             run = _build(plan, parts, watch)
         written = [write_log(plan, log, one, parts, watch) for log, one in zip(plan.logs, run.logs, strict=True)]
     return replace(run, logs=tuple(written)).as_named([request.recording for request in task.requests])
+
+
+def collect_for_map(request: Request, prior: Location | None, parts: Path, watch: Watch = unwatched) -> MappedLog:
+    """What one log gives to a map of many: its stages and observations, left among the `parts` of the database.
+
+    Raises:
+        ToolkitError: as `build_map`.
+    """
+    plan = plan_map(MapTask((request,), parts, prior=prior), parts)
+    return observe(plan, plan.logs[0], "they are for a map of many logs", parts, watch, is_kept=True).log
 
 
 def build_map_of(
@@ -90,15 +97,15 @@ def _check_replaceable(plan: MapPlan) -> None:
 def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
     """Run what is missing, gather what every log saw, solve, and write the database."""
     reason, began = why_anew(plan), time.perf_counter()
-    seen = [_observe(plan, log, reason, parts, watch) for log in plan.logs]
-    logs = [mapped for mapped, _, _ in seen]
+    seen = [observe(plan, log, reason, parts, watch) for log in plan.logs]
+    logs = [one.log for one in seen]
     with watch("solve", None, "steps"):
-        built = _solve(plan, logs, [observations for _, observations, _ in seen])
+        built = _solve(plan, logs, [one.observations for one in seen])
     landmark_map, termination = built.landmark_map, built.termination
     logs = [_told(log, built, i) for i, log in enumerate(logs)]
-    for log, trajectory, (_, _, shifts_ns) in zip(plan.logs, built.trajectories, seen, strict=True):
+    for log, trajectory, one in zip(plan.logs, built.trajectories, seen, strict=True):
         if trajectory is not None and log.request.recording in plan.task.outputs:
-            write_part(plan, log, landmark_map, trajectory_as_stamped(trajectory, shifts_ns), parts)
+            write_part(plan, log, landmark_map, trajectory_as_stamped(trajectory, one.shifts_ns), parts)
     others = sum(stage.seconds or 0.0 for log in logs for stage in log.stages)
     seconds = time.perf_counter() - began - others
     build = StageRun(STAGE.name, "ran", reason, build_outcome(plan, termination), seconds)
@@ -120,39 +127,6 @@ def _told(log: MappedLog, built: BuiltMap, row: int) -> MappedLog:
         "bundles of pieces of odometry that share too few landmarks with the map": left_out,
     }
     return replace(log, outcome=replace(log.outcome, dropped=dropped))
-
-
-_Observed = tuple[MappedLog, LogObservations, Mapping[int, int]]
-
-
-def _observe(plan: MapPlan, log: LogPlan, reason: str, parts: Path, watch: Watch) -> _Observed:
-    """Run the stages that a log lacks, and gather what it saw; by log time, how far its clock had been set back."""
-    with open_session(log.request, parts, plan.task.outputs.get(log.request.recording)) as session:
-        runs = [session.work(step, watch) for step in log.steps]
-        observations, reading, outcome = _collect(plan, log, session, watch)
-    notes, losses = told([*runs, StageRun(STAGE.name, "ran", reason, outcome)], [], [])
-    outcome = replace(outcome, losses=losses, notes=notes)
-    return MappedLog(log.request.recording, log.fingerprint, tuple(runs), outcome), observations, reading.shifts_ns
-
-
-def _collect(plan: MapPlan, log: LogPlan, session: Session, watch: Watch) -> tuple[LogObservations, Reading, Outcome]:
-    """Observations of one log.
-
-    Raises:
-        RecordingError: it has no scene objects or no odometry, or none of its bundles has odometry.
-    """
-    source = StageInput(STAGE, session.log_for(log.record), session.request.span, session.examiner)
-    with watch(f"read {source.path.name}", source.count, "bundles") as progress:
-        observations: LogObservations = STAGE.collect(source.bundles(progress), plan.config)
-    source.close()
-    source.reading.dropped.update(observations.dropped)
-    if not len(observations.stamps_ns):
-        raise RecordingError(
-            f"{source.path}: none of {observations.bundles} bundles has odometry within 2 s; check that the clocks of "
-            "odometry and scene objects agree"
-        )
-    outcome = outcome_of(source.reading, notes=source.notes)
-    return replace(observations, fingerprint=log.fingerprint), source.reading, outcome
 
 
 def _solve(plan: MapPlan, logs: Sequence[MappedLog], observations: Sequence[LogObservations]) -> BuiltMap:
