@@ -21,6 +21,9 @@ class Stream(IntEnum):
     ODOMETRY_DELIVERY = 11
     LENS = 12
     HUNT = 13
+    RINGS_CLOCK = 14
+    RINGS_DELIVERY = 15
+    RINGS = 16
 
 
 def draws(seed: int, stream: Stream, index: int = 0) -> np.random.Generator:

@@ -19,6 +19,7 @@ from mcap_landmarks_generator.sensor_specs import (
     NotNegative,
     OdometrySpec,
     Positive,
+    RingLidarSpec,
     TruthSpec,
 )
 
@@ -219,6 +220,8 @@ class Scenario:
     robot: RobotSpec = field(default_factory=RobotSpec)
     camera: CameraSpec = field(default_factory=CameraSpec)
     lidar: LidarSpec = field(default_factory=LidarSpec)
+    ring_lidar: RingLidarSpec | None = None
+    """A LiDAR of several rings beside `lidar`; none if left out."""
     odometry: OdometrySpec = field(default_factory=OdometrySpec)
     truth: TruthSpec = field(default_factory=TruthSpec)
     trajectory: TrajectorySpec = field(default_factory=TrajectorySpec)

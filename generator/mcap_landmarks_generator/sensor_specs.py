@@ -113,6 +113,44 @@ class LidarSpec(SensorSpec):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RingLidarSpec(SensorSpec):
+    """A LiDAR of several rings on a mast, whose clouds are PointCloud2 on /points."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
+
+    rate_hz: Positive = 10.0
+    """Turns per second."""
+    phase_s: NotNegative = 0.02
+    """Time of the first beam of the first turn."""
+    jitter_s: NotNegative = 0.0005
+    """Standard deviation of the time of each turn, cut at 0.4 periods."""
+    delay_s: NotNegative = 0.004
+    """The log time is this much later than the last beam."""
+    rings: Annotated[int, Field(ge=1, le=128)] = 16
+    """Rings, evenly spread in elevation."""
+    lowest_deg: Annotated[float, Field(ge=-60, le=60)] = -15.0
+    """Elevation of the lowest ring."""
+    highest_deg: Annotated[float, Field(ge=-60, le=60)] = 15.0
+    """Elevation of the highest ring."""
+    beams: Annotated[int, Field(ge=8, le=7200)] = 900
+    """Beams of a ring in a turn."""
+    height_m: Annotated[float, Field(ge=0.1, le=3)] = 0.5
+    """Height above base_footprint, straight over it."""
+    range_min_m: NotNegative = 0.5
+    """Nearest range; a nearer echo is no return."""
+    range_max_m: Positive = 60.0
+    """Farthest range."""
+    sigma_m: NotNegative = 0.02
+    """Standard deviation of a range."""
+    dropout: Share = 0.002
+    """Share of beams that return nothing."""
+    divergence_mrad: NotNegative = 3.0
+    """Width of a beam: where it meets an edge it measures something in between (mixed pixels)."""
+    rain: Share = 0.0
+    """Share of beams that a drop of rain may return before they arrive."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OdometrySpec(SensorSpec):
     """The odometry."""
 

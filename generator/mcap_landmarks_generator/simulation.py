@@ -17,6 +17,7 @@ from mcap_landmarks_generator.ground_truth import GroundTruth
 from mcap_landmarks_generator.history import History
 from mcap_landmarks_generator.lidar import Lidar
 from mcap_landmarks_generator.odometry import OdometrySensor, true_poses
+from mcap_landmarks_generator.ring_lidar import RINGS_FRAME, RingLidar
 from mcap_landmarks_generator.robot import (
     CAMERA_FROM_LINK_M,
     LINK_FROM_FOOTPRINT_M,
@@ -54,6 +55,8 @@ class Simulation:
         self._history = History()
         self._camera = Camera(scenario.camera, scenario.seed, scenario.start_ns)
         self._lidar = Lidar(scenario.lidar, scenario.seed, scenario.start_ns)
+        rings = scenario.ring_lidar
+        self._rings = RingLidar(rings, scenario.seed, scenario.start_ns) if rings is not None else None
         self._odometry = OdometrySensor(scenario.odometry, scenario.seed, scenario.start_ns)
         self._truth = GroundTruth(scenario.truth, staged.objects, scenario.start_ns)
         self._touched: set[str] = set()
@@ -82,7 +85,8 @@ class Simulation:
         """Messages and jobs as they are measured, and None after each step of time."""
         staged, steering = self._staged, self._steering
         watch = _StuckWatch()
-        frames = static_transforms(staged.scenario.start_ns)
+        rings = staged.scenario.ring_lidar
+        frames = static_transforms(staged.scenario.start_ns, rings.height_m if rings is not None else None)
         yield replace(frames, log_time_ns=frames.log_time_ns + to_ns(staged.scenario.robot.frames_after_s))
         with World(staged.objects, staged.start) as world:
             standing, step = False, 0
@@ -111,6 +115,8 @@ class Simulation:
         yield from self._truth.measure(self._history)
         yield from self._odometry.measure(self._history)
         yield from self._lidar.measure(self._history, world)
+        if self._rings is not None:
+            yield from self._rings.measure(self._history, world)
         yield from self._camera.measure(self._history)
 
     def _note_collisions(self, world: World) -> None:
@@ -138,8 +144,9 @@ class _StuckWatch:
             )
 
 
-def static_transforms(start_ns: int) -> Stamped:
-    """The robot's fixed frames: base_footprint, base_link, base_scan, camera_link, camera_rgb_optical_frame."""
+def static_transforms(start_ns: int, rings_height_m: float | None = None) -> Stamped:
+    """The robot's fixed frames: base_footprint, base_link, base_scan, camera_link, camera_rgb_optical_frame, and
+    ring_lidar where there is one at a height."""
     upright = np.array([0.0, 0.0, 0.0, 1.0])
     places = (
         (BASE_FRAME, "base_link", LINK_FROM_FOOTPRINT_M, upright),
@@ -151,4 +158,7 @@ def static_transforms(start_ns: int) -> Stamped:
         Transform(start_ns, parent, child, np.array(translation), rotation)
         for parent, child, translation, rotation in places
     )
+    if rings_height_m is not None:
+        mast = np.array([0.0, 0.0, rings_height_m])
+        transforms += (Transform(start_ns, BASE_FRAME, RINGS_FRAME, mast, upright),)
     return Stamped(TF_STATIC, start_ns, TFMessage(transforms))

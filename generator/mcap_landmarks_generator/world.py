@@ -1,6 +1,7 @@
 """The physical world: ground, objects and robot in one PyBullet client; steps in time and rays."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -15,6 +16,19 @@ Floats = NDArray[np.float64]
 
 STEP_NS = 4_000_000
 """Physics runs at 250 Hz."""
+_MOST_RAYS = 16_384
+"""So many rays PyBullet takes at once (MAX_RAY_INTERSECTION_BATCH_SIZE)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Returns:
+    """What N rays meet first: distances_m (N,), infinite for nothing; cosines (N,) of the angle to the normal there;
+    `names` of classes, empty for the ground, and per ray the number (N,) of its own among them."""
+
+    distances_m: Floats
+    cosines: Floats
+    names: tuple[str, ...]
+    name_of: NDArray[np.int64]
 
 
 class World:
@@ -81,3 +95,27 @@ class World:
             physicsClientId=self._client,
         )
         return np.array([hit[2] for hit in hits])
+
+    def returns(self, starts: Floats, directions: Floats, reach_m: float) -> Returns:
+        """What rays from `starts` (N, 3) along unit vectors `directions` (N, 3) meet within reach; not the robot."""
+        ends = starts + reach_m * directions
+        hits = []
+        for first in range(0, len(starts), _MOST_RAYS):
+            part = slice(first, first + _MOST_RAYS)
+            hits += pybullet.rayTestBatch(
+                starts[part].tolist(),
+                ends[part].tolist(),
+                numThreads=1,
+                collisionFilterMask=STATIC_GROUP,
+                physicsClientId=self._client,
+            )
+        share, bodies = np.array([hit[2] for hit in hits]), [hit[0] for hit in hits]
+        normals = np.array([hit[4] for hit in hits]).reshape(-1, 3)
+        names = ("", *sorted({placed.asset.name for placed in self._object_of_body.values()}))
+        number = {body: names.index(placed.asset.name) for body, placed in self._object_of_body.items()}
+        return Returns(
+            np.where(share < 1.0, share * reach_m, np.inf),
+            np.abs((normals * directions).sum(axis=1)),
+            names,
+            np.array([number.get(body, 0) for body in bodies], dtype=np.int64),
+        )
