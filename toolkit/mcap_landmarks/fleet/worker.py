@@ -16,8 +16,9 @@ from typing import BinaryIO, TextIO
 
 from mcap_landmarks.fleet.tasks import CommandLine, Cut, Ended, Task
 
-_UNUSABLE, _INTERRUPTED = 1, 130
-"""Exit codes of the command line (`cli.console`)."""
+_UNUSABLE = 1
+INTERRUPTED = (130, 143)
+"""Exit codes of the command line (`cli.console`): no usable output; and those of Ctrl-C and SIGTERM."""
 _ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM", "VECLIB_MAXIMUM_THREADS"),
     "1",
@@ -54,7 +55,7 @@ def _exit_code(task: Task, command_line: CommandLine) -> tuple[int, Cut | None]:
             return stop.code or 0, None
         sys.stderr.write(f"error: {stop.code}\n")
     except KeyboardInterrupt:
-        return _INTERRUPTED, None
+        return INTERRUPTED[0], None
     except MemoryError:
         sys.stderr.write(
             f"error: {task.log}: {task.verb} ran out of memory; use fewer --workers, or a machine with more memory\n"
