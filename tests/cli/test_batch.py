@@ -67,7 +67,7 @@ def test_wrong_usage_runs_nothing(folder: Path, tmp_path: Path, capsys: pytest.C
         (("batch", "plot", log), "no such verb"),
         (("batch", "localize", log, "--mapp", "x.db"), "--mapp is no option of localize"),
         (("batch", "localize", log), "Missing option '--map'"),
-        (("batch", "localize", "--map", "x.db"), "name the logs"),
+        (("batch", "localize", "--map", "x.db"), "name the logs, a quoted pattern"),
         (("batch", "map", log, "--map", "x.db"), "--map names one file"),
         (("batch", "evaluate", tmp_path / "*.mcap"), "no file matches"),
     ):

@@ -16,7 +16,7 @@ from tests.cli.logs import messages, write
 from tests.runs.chain import raw_log, two_posts
 
 LINES = {
-    "batch": "batch convert LOG -o {output}",
+    "batch": "batch convert LOG -o {output} --events {events}",
     "cluster": "cluster {logs} -o {output} --extrinsics {extrinsics} --config {config_file}",
     "config show": "config show --config {config_file}",
     "convert": "convert {inputs} -o {output} --config {config_file} --definitions {definitions}",
@@ -96,6 +96,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
         "file": folder / "map.json",
         "output": folder / "new",
         "definitions": folder / "State.msg",
+        "events": folder / "new.jsonl",
         "tum": folder / "new.tum",
         "thesis": folder / "new.txt",
         "criteria": folder / "config.toml",
@@ -143,6 +144,8 @@ def test_a_url_where_nothing_lies_is_named_without_what_may_be_secret(
     assert place == f"memory://nowhere/a//x.{ending}"
     if name in OUTPUTS and problem.startswith("an output"):
         assert (code, problem) == (2, "an output has no query; credentials come from the environment")
+    elif name == "events":
+        assert (code, problem) == (2, "events are added line by line; name a file of this machine")
     else:
         assert (code, problem) in {(kind, "there is no such file; check the URL") for kind in (1, 2)}
 

@@ -38,10 +38,19 @@ def allow(text: str | None) -> None:
     Raises:
         UsageError: the text is no size.
     """
+    _Bound.given = size(text, "--max-memory")
+
+
+def size(text: str | None, option: str) -> int | None:
+    """The bytes that an option means, such as 512M or 4G; None where it is not given.
+
+    Raises:
+        UsageError: the text is no size.
+    """
     match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([KMGT]?)(?:i?B)?", (text or "").strip(), re.IGNORECASE)
     if text is not None and (match is None or float(match[1]) == 0):
-        raise UsageError(f"--max-memory {text}: give a size such as 512M or 4G")
-    _Bound.given = int(float(match[1]) * _UNITS[match[2].upper()]) if match else None
+        raise UsageError(f"{option} {text}: give a size such as 512M or 4G")
+    return int(float(match[1]) * _UNITS[match[2].upper()]) if match else None
 
 
 def bound() -> int:

@@ -1,0 +1,111 @@
+"""The tasks of a batch: which logs, which output each, and the verb's options, checked before anything runs."""
+
+from collections.abc import Collection, Sequence
+from itertools import islice
+from typing import TYPE_CHECKING
+
+import typer
+from typer.core import TyperCommand, TyperGroup, TyperOption
+
+from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location, Url
+
+if TYPE_CHECKING:
+    from mcap_landmarks.fleet.tasks import Task
+
+VERBS = {
+    **dict.fromkeys(("convert", "detect", "cluster", "fuse", "localize", "run"), ".mcap"),
+    "map": ".db",
+    "evaluate": ".json",
+}
+"""What a batch can do, and the suffix of its results."""
+_ONE_FILE = {"map": ("--map",), "evaluate": ("--tum", "--thesis")}
+_DETECTS = ("detect", "map", "localize", "run")
+
+
+def tasks_of(verb: str, words: Sequence[str], output: Location) -> "list[Task]":
+    """What to run; the options are checked by the verb's own parser.
+
+    Raises:
+        UsageError: the verb, an option, a manifest or an output makes no sense.
+    """
+    from mcap_landmarks.fleet.fleet_manifest import words_of
+    from mcap_landmarks.fleet.inputs import find_logs, outputs_in
+    from mcap_landmarks.fleet.tasks import Task
+    from mcap_landmarks.runs.outputs import make_folder
+
+    own = _command_of(verb)
+    names, passed = _split(verb, own, words)
+    if not names:
+        raise UsageError(f"batch {verb}: name the logs, a quoted pattern such as 'logs/*.mcap', or a manifest")
+    threads = ("--set", "detect.threads=1") if verb in _DETECTS else ()
+    tasks: list[Task] = []
+    checked: set[tuple[str, ...]] = set()
+    logs = find_logs(names)
+    for log, target in outputs_in(make_folder(output), logs, VERBS[verb]):
+        options = (*threads, *words_of(log.options), *passed)
+        where = {"map": ("--map", _word(target)), "evaluate": ()}.get(verb, ("-o", _word(target)))
+        tasks.append(Task(log.place, target, (verb, _word(log.place), *where, "--json", *options)))
+        if options not in checked:
+            checked.add(options)
+            _check_names(verb, own, [f"--{name}" for name in log.options])
+            own.make_context(verb, list(tasks[-1].words[1:]))
+    if verb == "evaluate":
+        _check_documents(tasks, [log.place for log in logs], overwrite="--overwrite" in passed)
+    return tasks
+
+
+def _word(place: Location) -> str:
+    """A location as a command line has it; what is shown of a URL may lack its credentials."""
+    return place.text if isinstance(place, Url) else str(place)
+
+
+def _check_documents(tasks: "Sequence[Task]", logs: Sequence[Location], *, overwrite: bool) -> None:
+    """Refuse to replace what is there by the documents that are kept here, before anything runs."""
+    from mcap_landmarks.runs.replacing import new_files
+
+    with new_files([task.output for task in tasks], logs, overwrite=overwrite):
+        pass
+
+
+def _command_of(verb: str) -> TyperCommand:
+    from mcap_landmarks.cli.main import build
+
+    if verb in VERBS:
+        application = typer.main.get_command(build(verb))
+        own = application.commands.get(verb) if isinstance(application, TyperGroup) else None
+        if isinstance(own, TyperCommand):
+            return own
+    raise UsageError(f"batch {verb}: there is no such verb for many logs; choose one of {', '.join(VERBS)}")
+
+
+def _split(verb: str, own: TyperCommand, words: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The names of logs, and the verb's options with their values."""
+    takes = _options(own)
+    names, passed = [], []
+    rest = iter(words)
+    for word in rest:
+        if not word.startswith("-"):
+            names.append(word)
+            continue
+        name, equals, _ = word.partition("=")
+        _check_names(verb, own, [name])
+        passed.append(word)
+        if takes[name] and not equals:
+            passed.extend(islice(rest, 1))
+    return names, passed
+
+
+def _options(own: TyperCommand) -> dict[str, bool]:
+    """The options of a verb by name, and whether each takes a value."""
+    options = [option for option in own.params if isinstance(option, TyperOption)]
+    return {name: not option.is_flag for option in options for name in option.opts}
+
+
+def _check_names(verb: str, own: TyperCommand, names: Collection[str]) -> None:
+    known = _options(own)
+    for name in names:
+        if name not in known:
+            raise UsageError(f"{name} is no option of {verb}; see mcap-landmarks {verb} --help")
+        if name in _ONE_FILE.get(verb, ()):
+            raise UsageError(f"{name} names one file, and batch {verb} has many logs; run {verb} without batch for it")

@@ -1,0 +1,93 @@
+"""Which logs a fleet has, as names, patterns, prefixes and manifests give them, and where their results go."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from mcap_landmarks.atomic import check_target
+from mcap_landmarks.errors import ToolkitError, UsageError
+from mcap_landmarks.fleet.fleet_manifest import read_fleet_manifest
+from mcap_landmarks.inspection.open_logs import open_logs
+from mcap_landmarks.locations import Location, Url, address, is_there, location, matching, same_place
+
+MANIFEST = ".toml"
+"""What a manifest's name ends with."""
+
+
+@dataclass(frozen=True, slots=True)
+class FleetLog:
+    """A log, the name of its output without suffix (None: its own), and what a manifest says of its options."""
+
+    place: Location
+    name: str | None = None
+    options: Mapping[str, object] = field(default_factory=dict)
+
+    def key(self) -> tuple[str, str | None, str]:
+        """Equal for what is the same log with the same options and output."""
+        return address(self.place), self.name, repr(sorted(self.options.items()))
+
+
+def find_logs(names: Iterable[str]) -> list[FleetLog]:
+    """The logs that names, patterns (`**` is any depth), prefixes of URLs and manifests mean, each once: in the order
+    in which they are named, then by name.
+
+    Raises:
+        UsageError: a pattern matches nothing, a manifest is none, or a URL cannot be listed.
+    """
+    found: dict[tuple[str, str | None, str], FleetLog] = {}
+    for name in names:
+        place = location(name)
+        is_manifest = place.suffix == MANIFEST and (isinstance(place, Url) or is_there(place))
+        for log in _of_manifest(place) if is_manifest else map(FleetLog, matching(place)):
+            found.setdefault(log.key(), log)
+    return list(found.values())
+
+
+def _of_manifest(file: Location) -> list[FleetLog]:
+    """The logs of a manifest; paths in it are meant from its folder."""
+    logs = []
+    for entry in read_fleet_manifest(file):
+        place = location(entry.path)
+        if isinstance(place, Path):
+            place = file.parent / place if isinstance(file, Path) else file.with_name(entry.path)
+        logs.append(FleetLog(place, entry.name, entry.options))
+    return logs
+
+
+def outputs_in(folder: Location, logs: Sequence[FleetLog], suffix: str) -> list[tuple[FleetLog, Location]]:
+    """Each log with its output: the log's name with `suffix` in the folder. Earlier outputs there are no logs and are
+    left out.
+
+    A bag or data set that holds several logs, as one per robot, gets a folder of its own, without suffix.
+
+    Raises:
+        UsageError: two logs would write the same file, no log is left, or a target cannot be written.
+    """
+    outputs: list[tuple[FleetLog, Location]] = []
+    taken: dict[str, Location] = {}
+    for log in logs:
+        if log.place.suffix == suffix and same_place(folder / log.place.name, log.place):
+            continue
+        own = log.place.name if isinstance(log.place, Path) and log.place.is_dir() else log.place.stem
+        name = log.name or own
+        target = folder / (name if _holds_several(log.place) else f"{name}{suffix}")
+        if str(target) in taken:
+            other = taken[str(target)]
+            raise UsageError(f"{log.place}: {other} also writes {target}; rename one, or run them apart")
+        if not (isinstance(target, Path) and target.is_dir()):
+            check_target(target)
+        outputs.append((log, target))
+        taken[str(target)] = log.place
+    if not outputs:
+        raise UsageError(f"{folder}: all logs lie in the output folder; name another one with -o")
+    return outputs
+
+
+def _holds_several(place: Location) -> bool:
+    if place.suffix == ".mcap" or not isinstance(place, Path):
+        return False
+    try:
+        with open_logs(place, {}) as logs:
+            return len(logs) > 1
+    except ToolkitError:
+        return False  # its own task says what is wrong with it
