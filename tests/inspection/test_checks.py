@@ -9,6 +9,7 @@ import pytest
 from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, ODOMETRY, SCAN, SCENE_OBJECTS, TF_STATIC
 from mcap_landmarks.inspection.finding import Finding
 from mcap_landmarks.inspection.info import describe
+from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.progress import unwatched
 from mcap_landmarks.recording.writer import create_recording
@@ -183,6 +184,17 @@ def test_results_have_the_stamps_of_what_they_were_made_from(tmp_path: Path, top
         return Stamped(Channel(topic, SceneObjects), stamped.log_time_ns + SECOND, scene)
 
     assert [finding.topic for finding in findings(tmp_path, logged_late) if finding.check == "clock"] == said
+
+
+@pytest.mark.parametrize(("after_ns", "said"), [(STEP_NS + 3_000_000, []), (3 * STEP_NS, ["/points"])])
+def test_clouds_may_be_logged_a_turn_after_their_stamp(tmp_path: Path, after_ns: int, said: list[str]) -> None:
+    def as_cloud(stamped: Stamped) -> Stamped:
+        if stamped.channel != SCAN:
+            return stamped
+        cloud = PointCloud2(stamped.log_time_ns, "base_scan", np.ones((4, 3), np.float32))
+        return Stamped(Channel("/points", PointCloud2), stamped.log_time_ns + after_ns, cloud)
+
+    assert [finding.topic for finding in findings(tmp_path, as_cloud) if finding.check == "clock"] == said
 
 
 def test_problems_come_first(tmp_path: Path) -> None:

@@ -169,7 +169,7 @@ def _delay_ns(sensor: Sensor) -> float | None:
     if sensor.role == "camera_info" or not known.any():
         return None
     delay_ns, sweep_ns = float(np.median(log_ns[known] - stamp_ns[known])), float(sensor.sweep_ns)
-    if sensor.role == "scan" and not sweep_ns and known.sum() > 1:
+    if sensor.role in {"scan", "point_cloud"} and not sweep_ns and known.sum() > 1:
         sweep_ns = float(np.median(np.diff(log_ns[known])))  # a LiDAR that turns takes no longer than to the next scan
     return min(delay_ns, delay_ns - sweep_ns, key=abs)
 
