@@ -1,12 +1,13 @@
 """Detect objects in camera images."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, table
-from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, reading_logs
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, SegmentOptions, reading_logs
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.locations import Location, location
 
@@ -22,10 +23,17 @@ def command(
     output: options.Output,
     images: ImageOptions,
     given: LogOptions,
+    segments: SegmentOptions,
     names: options.Names = None,
+    segment: Annotated[str | None, typer.Option("--segment", hidden=True)] = None,
 ) -> None:
     """Detect objects in the camera images of LOG...; write the input with detections and annotations."""
-    runs = run_over("detect", ["detect"], logs, output, Given(given, images, files={"names": names}))
+    if segment is not None:  # a worker's part of a log that another process cuts
+        from mcap_landmarks.runs.segment_worker import run_segment
+
+        run_segment(segment, Path(str(output)))
+        return
+    runs = run_over("detect", ["detect"], logs, output, Given(given, images, files={"names": names}, segments=segments))
     finish("detect", runs, _document, _print, given.json)
 
 

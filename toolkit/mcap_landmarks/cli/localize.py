@@ -7,7 +7,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
-from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, reading_logs
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, SegmentOptions, reading_logs
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
@@ -27,6 +27,7 @@ def command(
     images: ImageOptions,
     scans: ScanOptions,
     given: LogOptions,
+    segments: SegmentOptions,
     output: options.MaybeOutput = None,
     at: Annotated[
         str | None,
@@ -40,9 +41,8 @@ def command(
 
     Where a log has no scene objects, they are made first, from images and scans.
     """
-    asked = Given(
-        given, images, scans, {"map": map_file, "extrinsics": extrinsics}, use, ["localize.fixed=true"] * fixed
-    )
+    files = {"map": map_file, "extrinsics": extrinsics}
+    asked = Given(given, images, scans, files, use, ["localize.fixed=true"] * fixed, segments)
     asked_ns = time_ns(at, "--at")
     if asked_ns is not None:
         if output is not None or len(logs) > 1:

@@ -8,7 +8,7 @@ import typer
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, table, warn
-from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, reading_logs
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, SegmentOptions, reading_logs
 from mcap_landmarks.cli.stage_runs import Given, tell, told
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
@@ -29,6 +29,7 @@ def command(
     images: ImageOptions,
     scans: ScanOptions,
     given: LogOptions,
+    segments: SegmentOptions,
     output: options.MaybeOutput = None,
     from_reference: Annotated[
         bool, typer.Option("--from-reference", help="Take the map from LOG's /ground_truth/objects (a surveyed map).")
@@ -50,7 +51,7 @@ def command(
     if from_reference:
         _from_reference(logs, database, given)
         return
-    asked = Given(given, images, scans, {"extrinsics": extrinsics}, use, ["build_map.fixed=true"] * fixed)
+    asked = Given(given, images, scans, {"extrinsics": extrinsics}, use, ["build_map.fixed=true"] * fixed, segments)
     if collect is not None:
         _collect(asked.requests(logs), prior, collect, given)
         return

@@ -47,6 +47,14 @@ class ImageOptions:
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
+class SegmentOptions:
+    """What verbs take that may detect in one log with several processes."""
+
+    segments: options.Segments = None
+    workers: options.SegmentWorkers = None
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
 class ScanOptions:
     """What verbs take that look at scans."""
 

@@ -82,6 +82,17 @@ Slice = Annotated[
 ImageRate = Annotated[
     float | None, typer.Option("--image-rate", metavar="HZ", help="Leave out images that come faster than this.")
 ]
+Segments = Annotated[
+    float | None,
+    typer.Option(
+        "--segments",
+        metavar="SECONDS",
+        help="Cut each log into parts of so much log time and detect in them with --workers; same results.",
+    ),
+]
+SegmentWorkers = Annotated[
+    int | None, typer.Option("--workers", min=1, help="Processes for --segments; as many as cores by default.")
+]
 Every = Annotated[
     str | None,
     typer.Option("--every", metavar="0.2m,5deg", help="Leave out images until the robot moved or turned so far."),

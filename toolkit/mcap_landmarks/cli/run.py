@@ -6,7 +6,7 @@ import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import say, table
-from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, reading_logs
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, SegmentOptions, reading_logs
 from mcap_landmarks.cli.stage_runs import Given, finish, run_over
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
@@ -31,6 +31,7 @@ def command(
     images: ImageOptions,
     scans: ScanOptions,
     given: LogOptions,
+    segments: SegmentOptions,
     map_file: options.MaybeMapFile = None,
     names: options.Names = None,
     extrinsics: options.Extrinsics = None,
@@ -40,7 +41,7 @@ def command(
     if not asked:
         raise UsageError("--stages names none; write for example --stages detect,cluster,fuse")
     files = {"map": map_file, "names": names, "extrinsics": extrinsics}
-    runs = run_over("run", asked, logs, output, Given(given, images, scans, files))
+    runs = run_over("run", asked, logs, output, Given(given, images, scans, files, segments=segments))
     finish("run", runs, _document, _print, given.json)
 
 

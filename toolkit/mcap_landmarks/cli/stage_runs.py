@@ -1,19 +1,22 @@
 """What the verbs that run stages over logs share: the runs themselves, notes, documents, exit codes."""
 
+import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import typer
 
 from mcap_landmarks.cli.console import PARTIAL, progress, say_json, warn
-from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
+from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, SegmentOptions
+from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.wording import tallied
 
 if TYPE_CHECKING:
     from mcap_landmarks.runs.pipeline import LogRun
     from mcap_landmarks.runs.plan import Request
+    from mcap_landmarks.runs.segment_tasks import Segments
     from mcap_landmarks.runs.session import StageRun
 
 
@@ -31,6 +34,7 @@ class Given:
     files: Mapping[str, Location | None] = field(default_factory=dict)
     use: Sequence[str] | None = None
     settings: Sequence[str] = ()
+    segments: SegmentOptions = field(default_factory=SegmentOptions)
 
     def requests(self, logs: Sequence[Location]) -> "list[Request]":
         """What to do with each log.
@@ -41,7 +45,8 @@ class Given:
         from mcap_landmarks.runs.run_options import RunOptions
 
         given, images, scans = self.options, self.images, self.scans
-        return RunOptions(
+        segments = _segments(self.segments)
+        requests = RunOptions(
             given.config_file,
             [*(given.settings or []), *self.settings],
             given.method,
@@ -62,6 +67,25 @@ class Given:
             force=given.force,
             overwrite=given.overwrite,
         ).requests(logs)
+        return [replace(request, segments=segments) for request in requests]
+
+
+def _segments(given: SegmentOptions) -> "Segments | None":
+    """Who makes segments, if any are wanted.
+
+    Raises:
+        UsageError: the options make no sense.
+    """
+    if given.segments is None:
+        if given.workers is not None:
+            raise UsageError("--workers takes --segments SECONDS, which says where a log is cut")
+        return None
+    from mcap_landmarks.cli.main import run
+    from mcap_landmarks.fleet.local_workers import LocalWorkers
+    from mcap_landmarks.fleet.segment_workers import segments_over
+
+    count = given.workers or len(os.sched_getaffinity(0))
+    return segments_over(LocalWorkers(count, run), given.segments)
 
 
 def run_over(

@@ -49,6 +49,11 @@ def reading_from_front() -> Iterator[None]:
         _from_front.reset(token)
 
 
+def reads_from_front() -> bool:
+    """Whether `reading_from_front` holds."""
+    return _from_front.get()
+
+
 @contextlib.contextmanager
 def open_recording(
     path: Location,
