@@ -276,8 +276,9 @@ class Stage:
 class Reduction:
     """The step that makes one result of many logs: `collect` per log, then `solve` over what was collected.
 
-    `collect(bundles, config)` gives one log's observations, `solve(observations, prior, config)` the map, one
-    trajectory per log, and how the solver ended. A log must have every channel of `reads` that is not `optional`.
+    `collect(bundles, config)` gives one log's observations, `alone(observations, config)` what of the map needs no
+    other, `solve(observations, prior, config, alone)` map, trajectories and how the solver ended. A log must have every
+    channel of `reads` that is not `optional`.
     """
 
     name: str
@@ -285,6 +286,7 @@ class Reduction:
     writes: tuple[Channel[Message], ...]
     config: type[Config]
     collect: Callable[[Iterable[Bundle], Any], Any]
+    alone: Callable[[Any, Any], Any]
     solve: Callable[..., Any]
     optional: tuple[Channel[Message], ...] = ()
     tolerance: Mapping[str, float | Tolerance] = field(default_factory=dict)

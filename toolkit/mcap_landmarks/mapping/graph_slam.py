@@ -104,10 +104,10 @@ def _solve_together(
     known: KnownLandmarks | None,
 ) -> tuple[Ints, GraphSolution]:
     """Numbers (L,) of all landmarks, and the minimum of the graph of all logs from where each of them got alone."""
-    parts = [(log.numbers, log.solved.state.landmarks_xy) for log in alone]
+    parts = [(log.numbers, log.state.landmarks_xy) for log in alone]
     transforms, numbers, landmarks = into_one_frame(parts, None if known is None else (known.number, known.xy))
     pairs = zip(transforms, alone, strict=True)
-    poses = np.concatenate([se2.compose(transform, log.solved.state.poses) for transform, log in pairs])
+    poses = np.concatenate([se2.compose(transform, log.state.poses) for transform, log in pairs])
     graph = _joint_graph(logs, [log.noise for log in alone], numbers, known)
     solved = minimise(graph, State(poses, landmarks), config.robust_dof, config.max_iterations)
     if len(logs) == 1:

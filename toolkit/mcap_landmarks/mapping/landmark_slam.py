@@ -19,23 +19,29 @@ from mcap_landmarks.mapping.groups import groups_of
 from mcap_landmarks.mapping.merge_logs import MergedLandmarks, merge_logs
 from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.mapping.odometry_fault import odometry_fault
-from mcap_landmarks.mapping.prepared_log import PreparedLog, class_ids_of, prepare
+from mcap_landmarks.mapping.prepared_log import LogAlone, PreparedLog, each_alone, prepared
 from mcap_landmarks.maps.model import LandmarkMap, MapSource
 
 Ints = NDArray[np.int64]
 
 # Of two logs that contradict each other none is to be believed more.
 _TWO = 2
+_NOTHING: Mapping[int, Sequence[LogAlone]] = {}
 # Variance in m^2 that keeps rounding from making a covariance negative: a hundredth of a millimetre.
 _ROUNDING_M2 = 1e-10
 
 
-def solve_jointly(logs: Sequence[LogObservations], prior: LandmarkMap | None, config: BuildMapConfig) -> BuiltMap:
+def solve_jointly(
+    logs: Sequence[LogObservations],
+    prior: LandmarkMap | None,
+    config: BuildMapConfig,
+    alone: Mapping[int, Sequence[LogAlone]] = _NOTHING,
+) -> BuiltMap:
     """One map of all logs, on top of `prior` where there is one, and each log's trajectory in it.
 
     A log that saw nothing, cannot be laid on the others or disagrees with them is left out where at least two others
     (or a prior and one) agree. The order of the logs does not matter; without a prior the frame is that of
-    the log with most firm landmarks (`merge_logs`).
+    the log with most firm landmarks (`merge_logs`). `alone` has what `each_alone` found of some logs, by their rows.
 
     Raises:
         MapError: nothing is left to make a map of, or the solver did not converge.
@@ -43,7 +49,7 @@ def solve_jointly(logs: Sequence[LogObservations], prior: LandmarkMap | None, co
     excluded = _seen_nothing(logs)
     _check_left(excluded, len(logs) - len(excluded), prior)
     names = sorted({name for log in logs for name in log.classes} | set(prior.classes if prior else ()))
-    parts, failed = _prepared(logs, excluded, names, config)
+    parts, failed = _prepared(logs, excluded, names, config, alone)
     excluded |= failed
     while True:
         parts = [part for part in parts if part.row not in excluded]
@@ -77,7 +83,11 @@ def _merged(
 
 
 def _prepared(
-    logs: Sequence[LogObservations], excluded: Collection[int], names: Sequence[str], config: BuildMapConfig
+    logs: Sequence[LogObservations],
+    excluded: Collection[int],
+    names: Sequence[str],
+    config: BuildMapConfig,
+    alone: Mapping[int, Sequence[LogAlone]],
 ) -> tuple[list[PreparedLog], dict[int, str]]:
     """The pieces of all logs, each on its own, and why some of three logs or more are not to be used.
 
@@ -88,15 +98,15 @@ def _prepared(
         if i in excluded:
             continue
         try:
-            parts = [prepare(i, part, class_ids_of(part, names), config) for part in log.pieces()]
+            parts = prepared(i, log, alone.get(i) or each_alone(log, config), names)
         except (MapError, RuntimeError) as error:  # what the sparse solver raises, too
             if len(logs) == 1:
                 raise
             failed[i] = f"cannot be mapped: {error}"
             continue
-        faults = [odometry_fault(part.observed, part.alone.solved.state.poses) for part in parts]
-        if faults[0] and len(logs) > _TWO:
-            failed[i] = faults[0]
+        fault = odometry_fault(parts[0].observed, parts[0].alone.state.poses)
+        if fault and len(logs) > _TWO:
+            failed[i] = fault
         found += parts
     return sorted(found, key=lambda part: part.log.fingerprint), failed
 

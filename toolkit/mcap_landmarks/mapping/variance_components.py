@@ -5,7 +5,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcap_landmarks.estimation.factor_graph import GraphSolution, minimise
+from mcap_landmarks.estimation.factor_graph import GraphSolution, State, minimise
 from mcap_landmarks.estimation.odometry import OdometryNoise
 from mcap_landmarks.estimation.termination import Termination
 from mcap_landmarks.mapping.config import BuildMapConfig
@@ -35,13 +35,13 @@ _SETTLED = 0.05
 
 @dataclass(frozen=True, slots=True)
 class LogSolution:
-    """One log on its own: its landmarks' numbers (L,), the minimum of its graph, and the noise found.
+    """One log on its own: its landmarks' numbers (L,), the state at the minimum of its graph, and the noise found.
 
     `termination` tells how the search for the noise ended, `iterations` how many the solution took that took most.
     """
 
     numbers: Ints
-    solved: GraphSolution
+    state: State
     noise: LogNoise
     termination: Termination
     iterations: int
@@ -63,7 +63,7 @@ def solve_with_its_noise(log: LandmarkObservations, config: BuildMapConfig) -> L
         solved = minimise(graph_of(log, rows, noise), solved.state, config.robust_dof, config.max_iterations)
         change, iterations = _largest_change(before, noise), max(iterations, solved.termination.iterations)
     termination = Termination(change <= _SETTLED, _ROUNDS, solved.termination.cost)
-    return LogSolution(numbers, solved, noise, termination, iterations)
+    return LogSolution(numbers, solved.state, noise, termination, iterations)
 
 
 def places(log: LandmarkObservations) -> Ints:

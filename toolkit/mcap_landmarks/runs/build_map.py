@@ -12,10 +12,9 @@ from mcap_landmarks.errors import MapError
 from mcap_landmarks.locations import Location
 from mcap_landmarks.manifest import Manifest
 from mcap_landmarks.mapping.built_map import BuiltMap
-from mcap_landmarks.mapping.observations import LogObservations
 from mcap_landmarks.maps.database import read_map, write_map
 from mcap_landmarks.progress import Watch, unwatched
-from mcap_landmarks.runs.log_observations import observe
+from mcap_landmarks.runs.log_observations import Observed, observe
 from mcap_landmarks.runs.map_plan import MapPlan, MapTask, plan_map
 from mcap_landmarks.runs.map_results import (
     VERB,
@@ -100,7 +99,7 @@ def _build(plan: MapPlan, parts: Path, watch: Watch) -> MapRun:
     seen = [observe(plan, log, reason, parts, watch) for log in plan.logs]
     logs = [one.log for one in seen]
     with watch("solve", None, "steps"):
-        built = _solve(plan, logs, [one.observations for one in seen])
+        built = _solve(plan, logs, seen)
     landmark_map, termination = built.landmark_map, built.termination
     logs = [_told(log, built, i) for i, log in enumerate(logs)]
     for log, trajectory, one in zip(plan.logs, built.trajectories, seen, strict=True):
@@ -129,7 +128,7 @@ def _told(log: MappedLog, built: BuiltMap, row: int) -> MappedLog:
     return replace(log, outcome=replace(log.outcome, dropped=dropped))
 
 
-def _solve(plan: MapPlan, logs: Sequence[MappedLog], observations: Sequence[LogObservations]) -> BuiltMap:
+def _solve(plan: MapPlan, logs: Sequence[MappedLog], seen: Sequence[Observed]) -> BuiltMap:
     """The map, where each log was in it, and how the solver ended.
 
     Raises:
@@ -137,7 +136,8 @@ def _solve(plan: MapPlan, logs: Sequence[MappedLog], observations: Sequence[LogO
     """
     prior = read_map(plan.task.prior) if plan.task.prior is not None else None
     try:
-        built: BuiltMap = STAGE.solve(observations, prior, plan.config)
+        alone = {i: one.alone for i, one in enumerate(seen) if one.alone}
+        built: BuiltMap = STAGE.solve([one.observations for one in seen], prior, plan.config, alone)
     except MapError as error:
         raise MapError(f"{_named(logs)}: {error}{_found_by(logs)}") from error
     return built

@@ -1,7 +1,7 @@
 """Build a landmark map from scene objects and odometry of one or several logs."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -11,12 +11,14 @@ from mcap_landmarks.mapping.built_map import BuiltMap
 from mcap_landmarks.mapping.config import BuildMapConfig
 from mcap_landmarks.mapping.landmark_slam import solve_jointly
 from mcap_landmarks.mapping.observations import LogObservations
+from mcap_landmarks.mapping.prepared_log import LogAlone, each_alone
 from mcap_landmarks.mapping.thesis import solve_as_in_the_thesis
 from mcap_landmarks.maps.model import LandmarkMap
 from mcap_landmarks.maps.scene_objects import known_covariances, standing
 from mcap_landmarks.messages.scene import SceneObjects
 from mcap_landmarks.stage import Bundle, OdometryAt, Reduction, Tolerance
 
+_NOTHING: Mapping[int, Sequence[LogAlone]] = {}
 FARTHEST_M = 500.0
 """Nothing that cameras and LiDARs of robots and cars see stands farther away."""
 
@@ -70,8 +72,25 @@ def _usable(bundles: Iterable[Bundle]) -> tuple[list[Bundle], list[SceneObjects]
     return kept, scenes, odometry, count
 
 
-def solve(logs: Sequence[LogObservations], prior: LandmarkMap | None, config: BuildMapConfig) -> BuiltMap:
+def alone(log: LogObservations, config: BuildMapConfig) -> tuple[LogAlone, ...]:
+    """What a log tells before others are known; nothing where `solve` will not ask for it, or would fail on it."""
+    if config.method == "thesis" or not len(log.bundle):
+        return ()
+    try:
+        return each_alone(log, config)
+    except (MapError, RuntimeError):
+        return ()
+
+
+def solve(
+    logs: Sequence[LogObservations],
+    prior: LandmarkMap | None,
+    config: BuildMapConfig,
+    alone: Mapping[int, Sequence[LogAlone]] = _NOTHING,
+) -> BuiltMap:
     """One map of all logs, each log's trajectory in it, and how the solver ended.
+
+    `alone` is what the function of that name found of some of the logs, by their rows.
 
     Raises:
         MapError: nothing was seen, a log cannot be joined to the others, or the solver did not converge.
@@ -86,7 +105,7 @@ def solve(logs: Sequence[LogObservations], prior: LandmarkMap | None, config: Bu
     if config.method == "thesis":
         return solve_as_in_the_thesis(logs)
     try:
-        return solve_jointly(logs, prior, config)
+        return solve_jointly(logs, prior, config, alone)
     except RuntimeError as error:  # what the sparse solver raises
         raise MapError(
             f"what was seen does not determine a map ({error}); look at positions and covariances"
@@ -100,6 +119,7 @@ STAGE = Reduction(
     config=BuildMapConfig,
     optional=(SCENE_VELOCITIES,),
     collect=collect,
+    alone=alone,
     solve=solve,
     tolerance={
         "position_m": 1e-4,
