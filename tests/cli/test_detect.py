@@ -20,7 +20,7 @@ from mcap_landmarks.recording.reader import open_recording
 from mcap_landmarks.resources import resource
 from mcap_landmarks.stage import Channel, Stamped
 
-from tests.cli.calls import call, topics
+from tests.cli.calls import call, refused, topics
 from tests.cli.logs import write
 from tests.vision.networks import answering
 
@@ -248,3 +248,22 @@ def test_the_provider_that_ran_is_what_counts(
     log, out = tmp_path / "log.mcap", tmp_path / "out.mcap"
     assert call("detect", log, "-o", out, "--model", model, "--set", "detect.provider=auto") == 2
     assert "detect.provider = cuda: this onnxruntime has no CUDAExecutionProvider" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_segments_over_two_processes_give_the_same_bytes(model: Path, tmp_path: Path) -> None:
+    whole = detected(tmp_path, model, images(count=9))
+    cut = tmp_path / "cut.mcap"
+    words = ("detect", tmp_path / "log.mcap", "-o", cut, "--model", model, "--segments", 3, "--workers", 2)
+    assert call(*words) == 0
+    assert cut.read_bytes() == whole.read_bytes()
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_segments_take_a_length_and_workers_segments(
+    model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = write(tmp_path / "log.mcap", images())
+    words = ("detect", log, "-o", tmp_path / "out.mcap", "--model", model)
+    assert "above 0, such as 60" in refused(capsys, 2, *words, "--segments", 0)
+    assert "--workers takes --segments SECONDS" in refused(capsys, 2, *words, "--workers", 2)

@@ -236,13 +236,12 @@ class Stage:
     """One step of the pipeline: what it reads and writes, its configuration and its code.
 
     The first channel of `reads` is the primary one: each of its messages makes a bundle, and a log must have it;
-    `thinned` lets --image-rate and --every leave out some of them. `in_segments`, of a stage that makes of each bundle
-    what it would alone, gives the configuration for workers on some of them. Channels of `reads` that are `optional`,
-    too, are read where they are there, and no other stage is run to make them. A channel of `writes` gets its own
-    topic, or the one that its function in `places` gives. `settle` leaves nothing of a configuration to the machine, so
-    that keys tell what ran. `resources` are files that the runner opens, hashes and passes in, `options` may be
-    missing; what a function in `choices` makes of what was given counts. `tolerance` says how far each field of `diff`
-    may be off on another machine; a number is absolute. Registries that are `extensible` take part in the results.
+    `thinned` lets --image-rate and --every leave out some. Where a bundle's results are those that it would have alone,
+    `in_segments` gives the configuration for workers on some of them. Channels of `reads` that are `optional`, too, are
+    read where they are, and no other stage is run to make them. A channel of `writes` gets its own topic, or the one
+    that its function in `places` gives. `settle` leaves nothing of a configuration to the machine. `resources` are
+    files that the runner hashes and passes in, `options` may be missing; what a function in `choices` makes of them
+    counts. `tolerance` says how far each field of `diff` may be off elsewhere. `extensible` take part in the results.
     """
 
     name: str
@@ -277,8 +276,7 @@ class Reduction:
     """The step that makes one result of many logs: `collect` per log, then `solve` over what was collected.
 
     `collect(bundles, config)` gives one log's observations, `alone(observations, config)` what of the map needs no
-    other, `solve(observations, prior, config, alone)` map, trajectories and how the solver ended. A log must have every
-    channel of `reads` that is not `optional`.
+    other, `solve(observations, prior, config, alone)` the rest. A log has every channel that is not `optional`.
     """
 
     name: str
