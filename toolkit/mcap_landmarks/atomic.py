@@ -29,6 +29,10 @@ _held: set[Path] = set()
 """The targets that this process holds."""
 
 
+class HeldError(RecordingError):
+    """Another process writes a target at this moment."""
+
+
 def check_target(target: _L, *, is_folder: bool = False) -> _L:
     """The target; refuses one that cannot become a regular file, or a folder. A link stands for its end.
 
@@ -64,7 +68,8 @@ def held(target: Location, *, is_folder: bool = False) -> Iterator[Path]:
 
     Raises:
         UsageError: see `check_target`.
-        RecordingError: another process holds it, the disk is full, or the folder may not be written.
+        HeldError: another process holds it.
+        RecordingError: the disk is full, or the folder may not be written.
     """
     check_target(target, is_folder=is_folder)
     path = staged_output(target.text) if isinstance(target, Url) else _real(_path(target))
@@ -74,7 +79,7 @@ def held(target: Location, *, is_folder: bool = False) -> Iterator[Path]:
     with _failing_as(target):
         descriptor = _lock(path, makes_folder=isinstance(target, Url))
     if descriptor is None:
-        raise RecordingError(f"{target}: another run writes to it; wait until that ends, or write to another file")
+        raise HeldError(f"{target}: another run writes to it; wait until that ends, or write to another file")
     _held.add(path)
     try:
         with _failing_as(target):

@@ -1,15 +1,19 @@
 """Catalogues as files: reading one, and appending the rows of a run to it."""
 
 import contextlib
-from collections.abc import Callable, Iterable
+import time
+from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
-from mcap_landmarks.atomic import atomic_file, check_target, held
+from mcap_landmarks.atomic import HeldError, atomic_file, check_target, held
 from mcap_landmarks.catalogue.catalogue_columns import COLUMNS, NEEDED, Catalogue, Row
 from mcap_landmarks.catalogue.parquet_file import from_parquet, need_pyarrow, to_parquet
 from mcap_landmarks.catalogue.sqlite_file import from_sqlite, to_sqlite
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.locations import Location, is_there
+
+_PATIENCE_S = 60.0
+"""A catalogue of a million rows is written in less; who holds it for longer hangs."""
 
 
 class _Format(NamedTuple):
@@ -72,15 +76,33 @@ def check_catalogue(place: Location) -> None:
 def append_rows(place: Location, rows: Iterable[Row]) -> None:
     """Write a catalogue anew, with rows behind those that it has; it is whole at any time.
 
+    Other batches of this machine may append to it at the same time: each waits for the others.
+
     Raises:
-        UsageError, RecordingError: see `check_catalogue`; or another process writes it.
+        UsageError, RecordingError: see `check_catalogue`.
     """
-    with held(place):
+    with _held_in_time(place):
         table = read_catalogue(place)
         _check_kinds(place, table)
         content = _format_of(place).write(table.with_rows(rows))
         with atomic_file(place) as stream:
             stream.write(content)
+
+
+@contextlib.contextmanager
+def _held_in_time(place: Location) -> Iterator[None]:
+    """Hold a catalogue as soon as nobody else does."""
+    end = time.monotonic() + _PATIENCE_S
+    with contextlib.ExitStack() as stack:
+        while True:
+            try:
+                stack.enter_context(held(place))
+                break
+            except HeldError:
+                if time.monotonic() > end:
+                    raise
+            time.sleep(0.05)
+        yield
 
 
 def _format_of(place: Location) -> _Format:
