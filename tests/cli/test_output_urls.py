@@ -143,7 +143,7 @@ def test_an_interrupted_run_goes_on_from_finished_stages(
         def stop(*_: object) -> None:
             raise KeyboardInterrupt
 
-        patch.setattr("mcap_landmarks.atomic.send_file", stop)
+        patch.setattr("mcap_landmarks.remote.staged_outputs.send_file", stop)
         assert call(*words) == 130
     assert bucket.names() == []
     assert call(*words) == 0

@@ -1,5 +1,7 @@
 """Outputs at URLs appear whole or not at all, and what could not be sent is kept where the error says."""
 
+import errno
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -118,6 +120,22 @@ def test_a_block_that_fails_sends_nothing(bucket: Bucket, cache: Path) -> None:
 
     with pytest.raises(RecordingError):
         fail_half_way()
+    assert bucket.names() == left_in(cache) == []
+
+
+def test_a_full_disk_names_the_url_and_where_there_is_no_room(
+    bucket: Bucket, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("mcap_landmarks.atomic.os.fsync", full)
+    with pytest.raises(RecordingError) as error:
+        write(bucket.url("a"), b"x")
+    assert str(error.value) == (
+        f"{bucket.url('a')}: cannot be made in {staged_output(bucket.url('a')).parent} (No space left on device); free "
+        "space there, or let MCAP_LANDMARKS_CACHE name another folder"
+    )
     assert bucket.names() == left_in(cache) == []
 
 

@@ -19,8 +19,6 @@ from typing import BinaryIO, TypeVar
 
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.locations import Location, Url
-from mcap_landmarks.remote.staged_outputs import send_file, send_folder, staged_output
-from mcap_landmarks.remote.uploads import check_uploadable
 
 _L = TypeVar("_L", bound=Location)
 _NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP}
@@ -40,6 +38,8 @@ def check_target(target: _L, *, is_folder: bool = False) -> _L:
         UsageError: its folder does not exist, what has its name is something else, or nothing can be written there.
     """
     if isinstance(target, Url):
+        from mcap_landmarks.remote.uploads import check_uploadable  # noqa: PLC0415 # not loaded for paths
+
         check_uploadable(target.text, is_folder=is_folder)
         return target
     path = _path(target)
@@ -72,7 +72,7 @@ def held(target: Location, *, is_folder: bool = False) -> Iterator[Path]:
         RecordingError: the disk is full, or the folder may not be written.
     """
     check_target(target, is_folder=is_folder)
-    path = staged_output(target.text) if isinstance(target, Url) else _real(_path(target))
+    path = _staged(target) if isinstance(target, Url) else _real(_path(target))
     if path in _held:
         yield path
         return
@@ -121,6 +121,8 @@ def atomic_path(target: Location) -> Iterator[Path]:
             with partial.open("rb") as stream:
                 os.fsync(stream.fileno())
             if isinstance(target, Url):
+                from mcap_landmarks.remote.staged_outputs import send_file  # noqa: PLC0415 # not loaded for paths
+
                 send_file(partial, target.text)
             else:
                 partial.replace(path)
@@ -141,6 +143,8 @@ def atomic_folder(target: Location) -> Iterator[Path]:
             partial.mkdir()
             yield partial
             if isinstance(target, Url):
+                from mcap_landmarks.remote.staged_outputs import send_folder  # noqa: PLC0415 # not loaded for paths
+
                 send_folder(partial, target.text)
                 return
             if path.exists():
@@ -159,6 +163,12 @@ def _path(target: Location) -> Path:
     if isinstance(target, Path):
         return target
     raise TypeError(f"{target!r} is no location")
+
+
+def _staged(target: Url) -> Path:
+    from mcap_landmarks.remote.staged_outputs import staged_output  # noqa: PLC0415 # not loaded for paths
+
+    return staged_output(target.text)
 
 
 def _beside(path: Path) -> Path:
@@ -226,7 +236,7 @@ def _failing_as(target: Location) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         if isinstance(target, Url):
-            folder = staged_output(target.text).parent
+            folder = _staged(target).parent
             raise RecordingError(
                 f"{target}: cannot be made in {folder} ({reason}); free space there, or let MCAP_LANDMARKS_CACHE name "
                 "another folder"
