@@ -16,7 +16,7 @@ from tests.cli.logs import messages, write
 from tests.runs.chain import raw_log, two_posts
 
 LINES = {
-    "batch": "batch convert LOG -o {output} --events {events}",
+    "batch": "batch convert LOG -o {output} --events {events} --catalogue {catalogue}",
     "cluster": "cluster {logs} -o {output} --extrinsics {extrinsics} --config {config_file}",
     "config show": "config show --config {config_file}",
     "convert": "convert {inputs} -o {output} --config {config_file} --definitions {definitions}",
@@ -97,6 +97,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
         "output": folder / "new",
         "definitions": folder / "State.msg",
         "events": folder / "new.jsonl",
+        "catalogue": folder / "new.db",
         "tum": folder / "new.tum",
         "thesis": folder / "new.txt",
         "criteria": folder / "config.toml",
@@ -123,7 +124,19 @@ def _parts(written: object) -> tuple[object, ...]:
     return (written, *(part for inner in get_args(written) for part in _parts(inner)))
 
 
-OUTPUTS = {"output", "file", "tum", "thesis", "junit", "markdown", "map_file", "database", "blessed", "images"}
+OUTPUTS = {
+    "output",
+    "catalogue",
+    "file",
+    "tum",
+    "thesis",
+    "junit",
+    "markdown",
+    "map_file",
+    "database",
+    "blessed",
+    "images",
+}
 """Places where some verb writes."""
 
 
@@ -132,7 +145,7 @@ OUTPUTS = {"output", "file", "tum", "thesis", "junit", "markdown", "map_file", "
 def test_a_url_where_nothing_lies_is_named_without_what_may_be_secret(
     verb: str, name: str, files: Mapping[str, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    ending = ENDINGS.get(verb, "mcap")
+    ending = "db" if name == "catalogue" else ENDINGS.get(verb, "mcap")
     url = f"memory://nowhere/a//x.{ending}?signature=secret"
     given = {**files, "output": files["output"].with_suffix(f".{ending}"), name: url}
     words = LINES[verb].format_map(given).replace("LOG", str(files["logs"])).split()

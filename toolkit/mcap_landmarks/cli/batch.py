@@ -35,6 +35,7 @@ def command(
 
     Options of VERB pass through: batch localize 'logs/*.mcap' --map m.db -o out --set localize.max_sigma_m=0.3
     """
+    from mcap_landmarks.cli.batch_catalogue import batch_rows
     from mcap_landmarks.cli.batch_events import event_lines
     from mcap_landmarks.cli.batch_run import run_batch
     from mcap_landmarks.cli.batch_table import live_table
@@ -45,8 +46,12 @@ def command(
     limits = batch.limits()
     with no_empty_folder(output):
         tasks = tasks_of(verb, words, output)
-        with event_lines(batch.events) as lines, live_table(verb, len(tasks)) as shown:
-            reports = run_batch(verb, tasks, batch.crew(len(tasks)), limits, [lines, shown])
+        with (
+            batch_rows(batch.catalogue, tasks) as rows,
+            event_lines(batch.events) as lines,
+            live_table(verb, len(tasks)) as shown,
+        ):
+            reports = run_batch(verb, tasks, batch.crew(len(tasks)), limits, [lines, shown, rows])
     for report in reports:
         for note in report["notes"]:
             warn(note)
@@ -58,5 +63,5 @@ def command(
     say_errors(reports)
     if counts["failed"] == len(reports):
         raise typer.Exit(UNUSABLE)
-    if counts["failed"] or counts["partial"]:
+    if counts["failed"] or counts["partial"] or rows.is_lost:
         raise typer.Exit(PARTIAL)

@@ -35,6 +35,16 @@ class BatchOptions:
         ),
     ] = None
 
+    catalogue: Annotated[
+        Location | None,
+        typer.Option(
+            "--catalogue",
+            parser=location,
+            metavar="FILE",
+            help="Add a row per log to this table: runs.parquet, or runs.db (SQLite) where pyarrow is not installed.",
+        ),
+    ] = None
+
     @property
     def prints_events(self) -> bool:
         """Whether stdout is for the events."""

@@ -23,6 +23,7 @@ _NOT_VERBS = {
     "options",
     "scenarios",
     "stage_runs",
+    "batch_catalogue",
     "batch_events",
     "batch_options",
     "batch_reports",
