@@ -24,6 +24,9 @@ class Stream(IntEnum):
     RINGS_CLOCK = 14
     RINGS_DELIVERY = 15
     RINGS = 16
+    IMU_CLOCK = 17
+    IMU_DELIVERY = 18
+    IMU = 19
 
 
 def draws(seed: int, stream: Stream, index: int = 0) -> np.random.Generator:

@@ -15,6 +15,7 @@ from mcap_landmarks_generator.assets import catalog, ground, sky
 from mcap_landmarks_generator.sensor_specs import (
     CONFIG,
     CameraSpec,
+    ImuSpec,
     LidarSpec,
     NotNegative,
     OdometrySpec,
@@ -222,6 +223,8 @@ class Scenario:
     lidar: LidarSpec = field(default_factory=LidarSpec)
     ring_lidar: RingLidarSpec | None = None
     """A LiDAR of several rings beside `lidar`; none if left out."""
+    imu: ImuSpec | None = None
+    """An inertial measurement unit; none if left out."""
     odometry: OdometrySpec = field(default_factory=OdometrySpec)
     truth: TruthSpec = field(default_factory=TruthSpec)
     trajectory: TrajectorySpec = field(default_factory=TrajectorySpec)

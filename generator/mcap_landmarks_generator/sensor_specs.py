@@ -151,6 +151,28 @@ class RingLidarSpec(SensorSpec):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ImuSpec(SensorSpec):
+    """An inertial measurement unit in the robot's own frame, on /imu; its defaults are of a cheap one (MEMS)."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
+
+    rate_hz: Annotated[float, Field(gt=0, le=250)] = 100.0
+    """Messages per second."""
+    jitter_s: NotNegative = 0.0002
+    """Standard deviation of the time of each message, cut at 0.4 periods."""
+    delay_s: NotNegative = 0.001
+    """The log time is this much later than the stamp."""
+    turn_sigma_dps: NotNegative = 0.1
+    """Standard deviation of a turn rate, in degrees per second."""
+    turn_bias_dps: NotNegative = 0.2
+    """Standard deviation from which the constant error of each axis is drawn."""
+    force_sigma_mps2: NotNegative = 0.05
+    """Standard deviation of a specific force."""
+    force_bias_mps2: NotNegative = 0.05
+    """Standard deviation from which the constant error of each axis is drawn."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OdometrySpec(SensorSpec):
     """The odometry."""
 

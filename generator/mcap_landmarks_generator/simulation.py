@@ -15,6 +15,7 @@ from mcap_landmarks_generator.checks import Staged
 from mcap_landmarks_generator.clock import to_ns
 from mcap_landmarks_generator.ground_truth import GroundTruth
 from mcap_landmarks_generator.history import History
+from mcap_landmarks_generator.imu import IMU_FRAME, ImuSensor
 from mcap_landmarks_generator.lidar import Lidar
 from mcap_landmarks_generator.odometry import OdometrySensor, true_poses
 from mcap_landmarks_generator.ring_lidar import RINGS_FRAME, RingLidar
@@ -27,6 +28,7 @@ from mcap_landmarks_generator.robot import (
     SCAN_FRAME,
     SCAN_FROM_LINK_M,
 )
+from mcap_landmarks_generator.scenario import Scenario
 from mcap_landmarks_generator.trajectory import STEPS_PER_COMMAND, Driver, Steering
 from mcap_landmarks_generator.world import STEP_NS, World
 
@@ -57,6 +59,8 @@ class Simulation:
         self._lidar = Lidar(scenario.lidar, scenario.seed, scenario.start_ns)
         rings = scenario.ring_lidar
         self._rings = RingLidar(rings, scenario.seed, scenario.start_ns) if rings is not None else None
+        imu = scenario.imu
+        self._imu = ImuSensor(imu, scenario.seed, scenario.start_ns) if imu is not None else None
         self._odometry = OdometrySensor(scenario.odometry, scenario.seed, scenario.start_ns)
         self._truth = GroundTruth(scenario.truth, staged.objects, scenario.start_ns)
         self._touched: set[str] = set()
@@ -85,8 +89,7 @@ class Simulation:
         """Messages and jobs as they are measured, and None after each step of time."""
         staged, steering = self._staged, self._steering
         watch = _StuckWatch()
-        rings = staged.scenario.ring_lidar
-        frames = static_transforms(staged.scenario.start_ns, rings.height_m if rings is not None else None)
+        frames = static_transforms(staged.scenario.start_ns, staged.scenario)
         yield replace(frames, log_time_ns=frames.log_time_ns + to_ns(staged.scenario.robot.frames_after_s))
         with World(staged.objects, staged.start) as world:
             standing, step = False, 0
@@ -114,6 +117,8 @@ class Simulation:
     def _measure(self, world: World) -> Iterator[Event]:
         yield from self._truth.measure(self._history)
         yield from self._odometry.measure(self._history)
+        if self._imu is not None:
+            yield from self._imu.measure(self._history)
         yield from self._lidar.measure(self._history, world)
         if self._rings is not None:
             yield from self._rings.measure(self._history, world)
@@ -144,21 +149,22 @@ class _StuckWatch:
             )
 
 
-def static_transforms(start_ns: int, rings_height_m: float | None = None) -> Stamped:
-    """The robot's fixed frames: base_footprint, base_link, base_scan, camera_link, camera_rgb_optical_frame, and
-    ring_lidar where there is one at a height."""
+def static_transforms(start_ns: int, scenario: Scenario | None = None) -> Stamped:
+    """The robot's fixed frames: base_footprint, base_link, base_scan, camera_link, camera_rgb_optical_frame, and those
+    of the further sensors of a scenario."""
     upright = np.array([0.0, 0.0, 0.0, 1.0])
-    places = (
+    places = [
         (BASE_FRAME, "base_link", LINK_FROM_FOOTPRINT_M, upright),
         ("base_link", SCAN_FRAME, SCAN_FROM_LINK_M, upright),
         ("base_link", "camera_link", CAMERA_FROM_LINK_M, upright),
         ("camera_link", OPTICAL_FRAME, OPTICAL_FROM_CAMERA_M, np.array(OPTICAL_FROM_CAMERA_XYZW)),
-    )
+    ]
+    if scenario is not None and scenario.imu is not None:
+        places.append((BASE_FRAME, IMU_FRAME, (0.0, 0.0, 0.0), upright))
+    if scenario is not None and scenario.ring_lidar is not None:
+        places.append((BASE_FRAME, RINGS_FRAME, (0.0, 0.0, scenario.ring_lidar.height_m), upright))
     transforms = tuple(
         Transform(start_ns, parent, child, np.array(translation), rotation)
         for parent, child, translation, rotation in places
     )
-    if rings_height_m is not None:
-        mast = np.array([0.0, 0.0, rings_height_m])
-        transforms += (Transform(start_ns, BASE_FRAME, RINGS_FRAME, mast, upright),)
     return Stamped(TF_STATIC, start_ns, TFMessage(transforms))
