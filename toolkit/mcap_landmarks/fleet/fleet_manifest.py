@@ -6,14 +6,16 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Strict, TypeAdapter, ValidationError
 
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location
 
 _T = TypeVar("_T", "ManifestFile", "LoggedEntry")
+Moment = Annotated[datetime, Strict()] | str | Annotated[int, Strict()]
+"""A time as TOML has it, as RFC 3339 in quotation marks, or as nanoseconds."""
 OptionValue = bool | int | float | str | list[str | int | float]
 """What an option's value may be: `true` sets a flag, a list repeats the option."""
 
@@ -24,8 +26,8 @@ class LoggedEntry:
 
     path: str
     name: str | None = None
-    start: datetime | str | int | None = None
-    end: datetime | str | int | None = None
+    start: Moment | None = None
+    end: Moment | None = None
     options: dict[str, OptionValue] = field(default_factory=dict)
 
 
@@ -76,7 +78,7 @@ def words_of(options: Mapping[str, object]) -> tuple[str, ...]:
     return tuple(words)
 
 
-def _written(value: datetime | str | int) -> str:
+def _written(value: Moment) -> str:
     return value.isoformat() if isinstance(value, datetime) else str(value)
 
 

@@ -3,7 +3,7 @@
 import contextlib
 import shutil
 import time
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -159,6 +159,10 @@ class Session:
     def _in_one_piece(self, step: Step) -> bool:
         """Whether this process runs a stage over the whole log."""
         return self.request.segments is None or step.stage.in_segments is None or self.log.has_videos
+
+    def has_all(self, steps: Sequence[Step]) -> bool:
+        """Whether no step has to run, since the results of all are there."""
+        return not self.request.force and all(self.find(step.record) is not None for step in steps)
 
     def _check_files(self, step: Step, reason: str) -> None:
         lacking = [name for name in step.stage.resources if name not in step.files]
