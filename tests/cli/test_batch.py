@@ -5,53 +5,89 @@ from pathlib import Path
 
 import jsonschema
 import pytest
+from mcap_landmarks.channels import ODOMETRY
+from mcap_landmarks.cli.batch_events import EventLines
+from mcap_landmarks.cli.batch_options import BatchOptions
+from mcap_landmarks.cli.batch_reports import Report
+from mcap_landmarks.cli.batch_table import LiveTable
+from mcap_landmarks.fleet.tasks import Ended, Task
 from mcap_landmarks.recording.reader import open_recording
 
 from tests.cli.calls import call, schema_of
 from tests.cli.logs import messages, write
+from tests.fleet.hanging_command import HangingWorkers
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two logs, one that is cut, one that is none, and a map."""
+    """Two logs, one that is cut, one without odometry, one to hang at, one that is none, and a map."""
     here = tmp_path_factory.mktemp("batch")
     (here / "logs").mkdir()
     write(here / "logs" / "a.mcap", messages(seed=1, count=60))
     whole = write(here / "logs" / "b.mcap", messages(seed=2, count=60)).read_bytes()
     (here / "logs" / "cut.mcap").write_bytes(whole[: len(whole) // 2])
     (here / "logs" / "none.mcap").write_text("no recording")
+    (here / "logs" / "hangs.mcap").write_bytes(whole)
+    write(here / "logs" / "unsteered.mcap", [one for one in messages(seed=3, count=60) if one.channel != ODOMETRY])
     assert call("map", here / "logs" / "a.mcap", "--map", here / "a.db") == 0
     return here
 
 
 @pytest.mark.slow
 def test_one_that_fails_does_not_stop_the_others(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    words = ("--map", folder / "a.db", "--set", "localize.max_sigma_m=0.4", "-o", tmp_path / "out", "--workers", 2)
+    """Of six logs one is cut, one has no odometry, one hangs and one is none; the next run goes on with these."""
+    monkeypatch.setattr(BatchOptions, "crew", lambda _options, _tasks: HangingWorkers())
+    words = ("--map", folder / "a.db", "--set", "localize.max_sigma_m=0.4", "-o", tmp_path / "out")
+    events = tmp_path / "events.jsonl"
     capsys.readouterr()
-    assert call("batch", "localize", folder / "logs" / "*.mcap", *words, "--json") == 3
+    line = ("batch", "localize", folder / "logs" / "*.mcap", *words, "--json")
+    assert call(*line, "--time-limit", 1, "--events", events) == 3
     printed = capsys.readouterr()
     document = json.loads(printed.out)
     jsonschema.validate(document, schema_of("batch"))
-    assert [Path(log["log"]).stem for log in document["logs"]] == ["a", "b", "cut", "none"]
-    assert [log["outcome"] for log in document["logs"]] == ["done", "done", "partial", "failed"]
-    assert [log["exit_code"] for log in document["logs"]] == [0, 0, 3, 1]
+    became = {Path(log["log"]).stem: (log["outcome"], log["exit_code"], log["attempts"]) for log in document["logs"]}
+    assert became == {
+        "a": ("done", 0, 1),
+        "b": ("done", 0, 1),
+        "cut": ("partial", 3, 1),
+        "hangs": ("failed", -9, 2),
+        "none": ("failed", 1, 1),
+        "unsteered": ("done", 0, 1),
+    }
     jsonschema.validate(document["logs"][1]["result"], schema_of("localize"))
-    jsonschema.validate(document["logs"][3]["result"], schema_of("error"))
-    assert "none.mcap is not an MCAP file" in printed.err
-    assert "cut at byte" in printed.err
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["a.mcap", "b.mcap", "cut.mcap"]
+    jsonschema.validate(document["logs"][4]["result"], schema_of("error"))
+    for said in (
+        "none.mcap is not an MCAP file",
+        "cut at byte",
+        "hangs.mcap: localize was ended after its --time-limit of 1 s",
+        "unsteered.mcap: 60 bundles without odometry at their time",
+    ):
+        assert said in printed.err
+    made = ["a.mcap", "b.mcap", "cut.mcap", "unsteered.mcap"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == made
     with open_recording(tmp_path / "out" / "b.mcap") as recording:
         assert "0.4" in recording.metadata["mcap-landmarks.run"]["config"]
+    told = [json.loads(text) for text in events.read_text().splitlines()]
+    for event in told:
+        jsonschema.validate(event, schema_of("batch_event"))
+    assert [event["event"] for event in told if "hangs" in event["log"]] == ["started", "retried", "ended"]
 
-    assert call("batch", "evaluate", tmp_path / "out" / "[ab].mcap", "--align", "-o", tmp_path / "figures") == 0
-    assert "2 done" in capsys.readouterr().out
+    assert call("batch", "localize", *(folder / "logs" / f"{name}.mcap" for name in ("a", "b")), *words) == 0
+    assert "2 skipped" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_documents_of_evaluate_are_kept(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = tmp_path / "a.mcap"
+    assert call("localize", folder / "logs" / "a.mcap", "--map", folder / "a.db", "-o", result) == 0
+    assert call("batch", "evaluate", result, "--align", "-o", tmp_path / "figures") == 0
+    assert "1 done" in capsys.readouterr().out
     jsonschema.validate(json.loads((tmp_path / "figures" / "a.json").read_text()), schema_of("evaluate"))
-    again = ("batch", "evaluate", tmp_path / "out" / "a.mcap", "--align", "-o", tmp_path / "figures")
+    again = ("batch", "evaluate", result, "--align", "-o", tmp_path / "figures")
     assert call(*again) == 2
     assert "replace it with --overwrite" in capsys.readouterr().err
-    assert call(*again, "--overwrite") == 0
 
 
 @pytest.mark.slow
@@ -63,6 +99,8 @@ def test_all_failed(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
 
 def test_wrong_usage_runs_nothing(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, out = folder / "logs" / "a.mcap", tmp_path / "out"
+    manifest = tmp_path / "fleet.toml"
+    manifest.write_text(f'[options]\nscan = "/scan"\n[[log]]\npath = "{log}"\n')
     for words, reason in (
         (("batch", "plot", log), "no such verb"),
         (("batch", "localize", log, "--mapp", "x.db"), "--mapp is no option of localize"),
@@ -70,7 +108,62 @@ def test_wrong_usage_runs_nothing(folder: Path, tmp_path: Path, capsys: pytest.C
         (("batch", "localize", "--map", "x.db"), "name the logs, a quoted pattern"),
         (("batch", "map", log, "--map", "x.db"), "--map names one file"),
         (("batch", "evaluate", tmp_path / "*.mcap"), "no file matches"),
+        (("batch", "evaluate", log, "--time-limit", 0), "--time-limit 0.0: give seconds, more than none"),
+        (("batch", "evaluate", log, "--memory-limit", "much"), "--memory-limit much: give a size such as"),
+        (("batch", "evaluate", log, "--events", "-", "--json"), "both print to stdout"),
+        (("batch", "evaluate", manifest), "--scan is no option of evaluate"),
     ):
         assert call(*words, "-o", out) == 2
         assert reason in capsys.readouterr().err
     assert not out.exists() or not list(out.iterdir())
+
+
+TASK = Task(Path("a.mcap"), Path("out/a.mcap"), ("localize", "a.mcap"))
+ENDED = Ended(TASK, 0, "", "", 2.0, 1_000_000, 2)
+REPORT = Report(
+    log="a.mcap",
+    output="out/a.mcap",
+    outcome="done",
+    exit_code=0,
+    seconds=2.0,
+    peak_bytes=1_000_000,
+    attempts=2,
+    errors=[],
+    notes=[],
+    result=None,
+)
+
+
+def test_the_table_shows_what_runs_and_what_ended(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: clock[0])
+    table = LiveTable("localize", 3, draws=True)
+    table.started(TASK, 1)
+    clock[0] = 90.0
+    assert table.rows() == [("a.mcap", "runs", "1:30"), ("localize: 0 of 3 logs, none ended", "", "")]
+    table.started(TASK, 2)
+    assert table.rows()[0] == ("a.mcap", "runs again", "0:00")
+    clock[0] = 120.0
+    table.ended(REPORT, ENDED)
+    assert table.rows() == [("localize: 1 of 3 logs, 1 done", "0.5 logs/min", "4:00 left")]
+    assert capsys.readouterr().err == ""
+    LiveTable("localize", 3, draws=False).ended(REPORT, ENDED)
+    assert capsys.readouterr().err == "a.mcap: done (2.0 s)\n"
+
+
+def test_events_are_lines_that_are_there_at_once(tmp_path: Path) -> None:
+    with (tmp_path / "events").open("w") as stream:
+        lines = EventLines(stream)
+        lines.started(TASK, 7)
+        lines.started(TASK, 8)
+        lines.ended(REPORT, ENDED)
+        told = [json.loads(line) for line in (tmp_path / "events").read_text().splitlines()]
+    for event in told:
+        jsonschema.validate(event, schema_of("batch_event"))
+    assert [(event["event"], event.get("worker")) for event in told] == [
+        ("started", 7),
+        ("retried", 8),
+        ("ended", None),
+    ]
