@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import FrameType
 
 from mcap_landmarks.errors import ToolkitError
+from mcap_landmarks.remote.shown_copies import as_named
 
 DONE, UNUSABLE, USAGE, PARTIAL, INTERRUPTED, TERMINATED = 0, 1, 2, 3, 130, 143
 """Exit codes: 2 is also what the shell's own tools mean by wrong usage, 130 and 143 its own of Ctrl-C and SIGTERM."""
@@ -121,12 +122,12 @@ def harmless(text: str) -> str:
 
 def warn(text: str) -> None:
     """One line on stderr."""
-    print(" ".join(harmless(text).split()), file=sys.stderr)
+    print(" ".join(harmless(as_named(text)).split()), file=sys.stderr)
 
 
 def say(text: str = "") -> None:
     """One line of a result on stdout."""
-    print(harmless(text))
+    print(harmless(as_named(text)))
 
 
 def say_json(verb: str, document: Mapping[str, object]) -> None:
@@ -135,6 +136,7 @@ def say_json(verb: str, document: Mapping[str, object]) -> None:
     Control characters in names are escaped, also those that JSON would let stand.
     """
     text = json.dumps({"schema": f"mcap-landmarks/{verb}/1", **_plain_entries(document)}, indent=2, ensure_ascii=False)
+    text = as_named(text)
     print(_HARMFUL.sub(lambda found: found[0] if found[0] == "\n" else f"\\u{ord(found[0]):04x}", text))
 
 

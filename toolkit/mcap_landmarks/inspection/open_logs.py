@@ -79,15 +79,10 @@ def open_logs(place: Location, settings: Settings) -> Iterator[Sequence[OpenLog]
         yield [_recording_elsewhere(place, settings)]
         return
     path = to_read(place)
-    try:
-        source = source_of(path)
-        config = stage_config(source.config, source.name, settings.get(source.name, {}))
-        with source.open(path, config) as found:
-            yield [_opened(place, source.name, config, log, in_folder=path.is_dir()) for log in found]
-    except RecordingError as error:
-        if path is place:
-            raise
-        raise RecordingError(str(error).replace(str(path), str(place))) from error  # not of the copy
+    source = source_of(path)
+    config = stage_config(source.config, source.name, settings.get(source.name, {}))
+    with source.open(path, config) as found:
+        yield [_opened(place, source.name, config, log, in_folder=path.is_dir()) for log in found]
 
 
 def _recording_elsewhere(place: Url, settings: Settings) -> OpenLog:

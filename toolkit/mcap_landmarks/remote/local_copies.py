@@ -17,7 +17,7 @@ from mcap_landmarks.remote.folder_copies import StoredFolder
 from mcap_landmarks.remote.refusals import WholeOnlyError, persistently
 from mcap_landmarks.remote.remote_file import RemoteFile
 from mcap_landmarks.remote.scratch_folder import scratch_folder
-from mcap_landmarks.remote.shown_copies import NOTE, WATCH
+from mcap_landmarks.remote.shown_copies import NOTE, WATCH, name_copy
 from mcap_landmarks.remote.stored_file import FolderError, stored_file
 from mcap_landmarks.remote.stores import store
 
@@ -139,6 +139,7 @@ def _copied_by(fill: Callable[[Path, Progress], None], text: str, version: str, 
     finally:
         shutil.rmtree(partial, ignore_errors=True)
     _copied[text] = version, folder / name
+    name_copy(folder / name, shown(text))
     return folder / name
 
 

@@ -74,16 +74,26 @@ def size_in(entry: Entry, path: str) -> int:
     return int(cast("int", entry.get("size")))
 
 
+class _Fetching(Protocol):
+    fetcher: Callable[[int, int], bytes]
+
+
+class _OpenedFile(Protocol):
+    """A file of s3fs: what its store says of it, and what gets parts of that version."""
+
+    details: Entry
+    cache: _Fetching
+
+
 class _PinnedFile:
     """A file of S3, which is asked for parts of that ETag only."""
 
     begin = b""
 
     def __init__(self, file_system: FileSystem, path: str) -> None:
-        entry = file_system.info(path)
-        self.size, self.version = size_in(entry, path), version_in(entry)
-        opened = file_system.open(path, "rb", cache_type="none")
-        self._get: Callable[[int, int], bytes] = opened.cache.fetcher  # type: ignore[attr-defined] # fsspec's files
+        opened = cast("_OpenedFile", file_system.open(path, "rb", cache_type="none"))
+        self.size, self.version = size_in(opened.details, path), version_in(opened.details)
+        self._get = opened.cache.fetcher
 
     def bytes_of(self, start: int, end: int) -> bytes:
         """See `StoredFile`."""
