@@ -14,6 +14,7 @@ from tests.remote.object_store import Bucket
 from tests.runs.chain import raw_log, two_posts
 
 LINES = {
+    "batch": "batch convert {raw} {raw2} --workers 1 -o OUT/batch/",
     "cluster": "cluster {raw} -o OUT/a.mcap",
     "convert": "convert {raw} -o OUT/a.mcap",
     "convert to a bag": "convert {raw} --to rosbag2 -o OUT/bag/",

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from mcap_landmarks.catalogue.catalogue_file import read_catalogue
 
 from tests.cli.calls import call
 from tests.cli.logs import messages, write
@@ -25,6 +26,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     localized_log(folder / "result.mcap")
     with serving() as server:
         server.files |= {path.name: path for path in folder.iterdir()}
+        server.files["none.mcap"] = b"no recording"
         yield server
 
 
@@ -65,6 +67,13 @@ def test_nothing_that_was_planted_comes_out(
     assert call("report", signed(served, "result.mcap"), out / "local.mcap", "-o", out / "fleet.html") == 0
     assert call("report", signed(served, "result.mcap"), "-o", out / "page.html") == 0
     assert call("diff", signed(served, "result.mcap"), signed(served, "result.mcap")) == 0
+    named = ("--catalogue", bucket.url("runs.db"), "--events", out / "events.jsonl", "--workers", 1)
+    assert call("batch", *localize, signed(served, "none.mcap"), "-o", bucket.url("batch/"), *named) == 3
+    (out / "runs.db").write_bytes(bucket.read("runs.db"))
+    done, failed = read_catalogue(out / "runs.db").rows
+    assert (done["output"], failed["output"]) == (bucket.url("batch/log.mcap"), None)
+    assert (done["log"], done["bundles"]) == (f"{served.url('log.mcap')}?...", 40)
+    assert call("report", bucket.url("runs.db"), "-o", out / "catalogue.html") == 3
     text = check_clean(capsys, out, tmp_path / "cache")
     assert f"{served.url('log.mcap')}?..." in text or f"{served.url('result.mcap')}?..." in text
 
