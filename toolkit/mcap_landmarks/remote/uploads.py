@@ -76,7 +76,7 @@ def upload(source: Path, text: str, progress: Progress = lambda _advance: None) 
     """
     file_system, path = store(text)
     size = source.stat().st_size
-    if size <= PART:
+    if size <= PART or scheme_of(text) == "memory":  # which shows what was not ended, too
         content = source.read_bytes()
         persistently(text, lambda: file_system.pipe_file(path, content))
         progress(size)
