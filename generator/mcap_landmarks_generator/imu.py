@@ -20,6 +20,8 @@ IMU_FRAME = "imu_link"
 _GRAVITY_MPS2 = np.array([0.0, 0.0, 9.81])
 _OVER_NS = 5 * STEP_NS
 """Motion is differentiated over so long before and after: contacts of the wheels shake the body within single steps."""
+KNOWN_AFTER_NS = 2 * _OVER_NS
+"""So long after a time, at the latest, it is known what was felt then."""
 
 
 class ImuSensor:
@@ -36,7 +38,7 @@ class ImuSensor:
 
     def measure(self, history: History) -> Iterator[Stamped]:
         """The messages whose time, and a little after it, lies in the past."""
-        while self._next_ns + _OVER_NS <= history.end_ns:
+        while max(self._next_ns, _OVER_NS) + _OVER_NS <= history.end_ns:
             delivered = self._delivery.of(self._next_ns)
             message = self._message(history, self._next_ns, delivered.stamp_ns if delivered is not None else 0)
             if delivered is not None:

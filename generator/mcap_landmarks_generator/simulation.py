@@ -15,7 +15,7 @@ from mcap_landmarks_generator.checks import Staged
 from mcap_landmarks_generator.clock import to_ns
 from mcap_landmarks_generator.ground_truth import GroundTruth
 from mcap_landmarks_generator.history import History
-from mcap_landmarks_generator.imu import IMU_FRAME, ImuSensor
+from mcap_landmarks_generator.imu import IMU_FRAME, KNOWN_AFTER_NS, ImuSensor
 from mcap_landmarks_generator.lidar import Lidar
 from mcap_landmarks_generator.odometry import OdometrySensor, true_poses
 from mcap_landmarks_generator.ring_lidar import RINGS_FRAME, RingLidar
@@ -78,8 +78,8 @@ class Simulation:
                 heapq.heappush(waiting, (event.log_time_ns, count, event))
                 count += 1
                 continue
-            # What is measured later is logged later than the step before this one.
-            safe_ns = self._staged.scenario.start_ns + self._history.end_ns - STEP_NS
+            # What is measured later is logged later than the step before this one, but for what is known later.
+            safe_ns = self._staged.scenario.start_ns + self._history.end_ns - STEP_NS - KNOWN_AFTER_NS
             while waiting and waiting[0][0] < safe_ns:
                 yield heapq.heappop(waiting)[2]
         while waiting:

@@ -45,6 +45,8 @@ def test_messages_stay_in_the_order_in_which_they_are_logged(stage_text: StageTe
         late = 0.3
         late_s = 0.2
         dropped = 0.2
+        [imu]
+        rate_hz = 100
         [robot]
         frames_after_s = 0.5
         [trajectory]

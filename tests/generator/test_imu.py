@@ -37,6 +37,17 @@ def test_a_circle_is_felt_as_turn_gravity_and_pull_to_its_middle() -> None:
     assert force == pytest.approx([0.0, SPEED_MPS * RATE_RADPS, 9.81], abs=1e-2)
 
 
+def test_nothing_is_told_before_its_motion_is_known() -> None:
+    sensor, history, found = ImuSensor(ImuSpec(), 4, 0), History(), []
+    whole = driven(40)
+    for step in range(40):
+        at = np.array([step * STEP_NS])
+        history.append(RobotState(whole.positions(at)[0], whole.orientations(at)[0], np.zeros(2)), standing=False)
+        found += [stamped.message for stamped in sensor.measure(history)]
+    assert len(found) == 14
+    assert all(np.isfinite([message.turn_radps, message.force_mps2]).all() for message in found)
+
+
 def test_noise_and_biases_are_as_said() -> None:
     exact = ImuSpec(turn_sigma_dps=0, turn_bias_dps=0, force_sigma_mps2=0, force_bias_mps2=0, jitter_s=0)
     plain = messages(exact, driven())
