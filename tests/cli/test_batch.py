@@ -91,10 +91,36 @@ def test_documents_of_evaluate_are_kept(folder: Path, tmp_path: Path, capsys: py
 
 
 @pytest.mark.slow
+def test_one_map_of_all_logs(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The bytes of `map` in one process; what is no log is named, and what the others gave is taken again."""
+    logs, out = folder / "logs", tmp_path / "out"
+    words = ("batch", "map", logs / "[ab].mcap", "-o", out, "--workers", 2, "--json")
+    assert call(*words[:3], logs / "none.mcap", *words[3:]) == 3
+    printed = capsys.readouterr()
+    document = json.loads(printed.out)
+    jsonschema.validate(document, schema_of("batch"))
+    assert [log["outcome"] for log in document["logs"]] == ["done", "done", "failed"]
+    jsonschema.validate(document["logs"][0]["result"], schema_of("map_log"))
+    jsonschema.validate(document["map"], schema_of("map"))
+    assert len(document["map"]["logs"]) == 2
+    assert "none.mcap is not an MCAP file" in printed.err
+    assert len(list((out / ".map.db.parts").glob("*.npz"))) == 2
+    made = (out / "map.db").read_bytes()
+    one = ("map", logs / "b.mcap", logs / "a.mcap", "--map", tmp_path / "one.db", "--set", "detect.threads=1")
+    assert call(*one) == 0
+    assert made == (tmp_path / "one.db").read_bytes()
+    capsys.readouterr()
+    assert call(*words) == 0
+    assert json.loads(capsys.readouterr().out)["map"]["stages"]["build_map"] == "reused"
+    assert (out / "map.db").read_bytes() == made
+    assert [path.name for path in out.iterdir()] == ["map.db"]
+
+
+@pytest.mark.slow
 def test_all_failed(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call("batch", "map", folder / "logs" / "none.mcap", "-o", tmp_path / "maps") == 1
     assert "1 failed" in capsys.readouterr().out
-    assert list((tmp_path / "maps").iterdir()) == []
+    assert not (tmp_path / "maps").exists()
 
 
 def test_wrong_usage_runs_nothing(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -106,7 +132,9 @@ def test_wrong_usage_runs_nothing(folder: Path, tmp_path: Path, capsys: pytest.C
         (("batch", "localize", log, "--mapp", "x.db"), "--mapp is no option of localize"),
         (("batch", "localize", log), "Missing option '--map'"),
         (("batch", "localize", "--map", "x.db"), "name the logs, a quoted pattern"),
-        (("batch", "map", log, "--map", "x.db"), "--map names one file"),
+        (("batch", "map", log, "--from-reference"), "--from-reference is for one log, and batch map has many"),
+        (("batch", "detect", log, "--segments", "5"), "--segments is for one log"),
+        (("batch", "evaluate", log, "--tum", "x.tum"), "--tum names one file"),
         (("batch", "evaluate", tmp_path / "*.mcap"), "no file matches"),
         (("batch", "evaluate", log, "--time-limit", 0), "--time-limit 0.0: give seconds, more than none"),
         (("batch", "evaluate", log, "--memory-limit", "much"), "--memory-limit much: give a size such as"),

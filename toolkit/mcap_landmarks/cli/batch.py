@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from mcap_landmarks.cli import options
+from mcap_landmarks.cli.batch_map import map_logs
 from mcap_landmarks.cli.batch_options import BatchOptions
 from mcap_landmarks.cli.batch_reports import counts_of, print_reports, say_errors
 from mcap_landmarks.cli.batch_tasks import VERBS, tasks_of
@@ -33,7 +34,8 @@ def command(
 ) -> None:
     """Run VERB over every log; one that fails, hangs or is killed does not stop the others.
 
-    Options of VERB pass through: batch localize 'logs/*.mcap' --map m.db -o out --set localize.max_sigma_m=0.3
+    Of all logs `map` makes one map: map.db in the folder, or what --map says. Options of VERB pass through:
+    batch localize 'logs/*.mcap' --map m.db -o out --set localize.max_sigma_m=0.3
     """
     from mcap_landmarks.cli.batch_catalogue import batch_rows
     from mcap_landmarks.cli.batch_events import event_lines
@@ -43,6 +45,10 @@ def command(
 
     if batch.prints_events and json:
         raise UsageError("--events - and --json both print to stdout; give --events a file")
+    if verb == "map":
+        with no_empty_folder(output):
+            map_logs(words, output, batch, prints_json=json)
+        return
     limits = batch.limits()
     with no_empty_folder(output):
         tasks = tasks_of(verb, words, output)

@@ -132,7 +132,7 @@ def print_reports(verb: str, reports: Sequence[Report], counts: Mapping[str, int
 
 _FIGURES: dict[str, dict[str, tuple[str, ...]]] = {
     "convert": {"messages": ("read",), "lost": ("lost",)},
-    "map": {"landmarks": ("landmarks",), "tentative": ("tentative",)},
+    "map": {"bundles": ("bundles",)},
     "detect": {"images": ("images",), "detections": ("detections",)},
     "localize": {"bundles": ("bundles",), "localized": ("statuses", "localized")},
     "evaluate": {

@@ -19,8 +19,12 @@ VERBS = {
     "evaluate": ".json",
 }
 """What a batch can do, and the suffix of its results."""
-_ONE_FILE = {"map": ("--map",), "evaluate": ("--tum", "--thesis")}
-_DETECTS = ("detect", "map", "localize", "run")
+_ONE_FILE = {"evaluate": ("--tum", "--thesis")}
+_OF_ONE_LOG = {"--from-reference", "--segments", "--parts", "--collect"}
+"""Options that make no sense for many logs; a batch has workers for its logs already."""
+_DETECTS = ("detect", "localize", "run")
+ONE_THREAD = ("--set", "detect.threads=1")
+"""What workers are told that are as many as cores."""
 
 
 def tasks_of(verb: str, words: Sequence[str], output: Location) -> "list[Task]":
@@ -34,18 +38,15 @@ def tasks_of(verb: str, words: Sequence[str], output: Location) -> "list[Task]":
     from mcap_landmarks.fleet.tasks import Task
     from mcap_landmarks.runs.outputs import make_folder
 
-    own = _command_of(verb)
-    names, passed = _split(verb, own, words)
-    if not names:
-        raise UsageError(f"batch {verb}: name the logs, a quoted pattern such as 'logs/*.mcap', or a manifest")
-    threads = ("--set", "detect.threads=1") if verb in _DETECTS else ()
+    own, names, passed = split(verb, words)
+    threads = ONE_THREAD if verb in _DETECTS else ()
     tasks: list[Task] = []
     checked: set[tuple[str, ...]] = set()
     logs = find_logs(names)
     for log, target in outputs_in(make_folder(output), logs, VERBS[verb]):
         options = (*threads, *words_of(log.options), *passed)
-        where = {"map": ("--map", _word(target)), "evaluate": ()}.get(verb, ("-o", _word(target)))
-        tasks.append(Task(log.place, target, (verb, _word(log.place), *where, "--json", *options)))
+        where = () if verb == "evaluate" else ("-o", word(target))
+        tasks.append(Task(log.place, target, (verb, word(log.place), *where, "--json", *options)))
         if options not in checked:
             checked.add(options)
             _check_names(verb, own, [f"--{name}" for name in log.options])
@@ -55,7 +56,7 @@ def tasks_of(verb: str, words: Sequence[str], output: Location) -> "list[Task]":
     return tasks
 
 
-def _word(place: Location) -> str:
+def word(place: Location) -> str:
     """A location as a command line has it; what is shown of a URL may lack its credentials."""
     return place.text if isinstance(place, Url) else str(place)
 
@@ -79,21 +80,28 @@ def _command_of(verb: str) -> TyperCommand:
     raise UsageError(f"batch {verb}: there is no such verb for many logs; choose one of {', '.join(VERBS)}")
 
 
-def _split(verb: str, own: TyperCommand, words: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The names of logs, and the verb's options with their values."""
+def split(verb: str, words: Sequence[str]) -> tuple[TyperCommand, list[str], list[str]]:
+    """The verb's own command, the names of logs, and the verb's options with their values.
+
+    Raises:
+        UsageError: there is no such verb or option, or no log is named.
+    """
+    own = _command_of(verb)
     takes = _options(own)
     names, passed = [], []
     rest = iter(words)
-    for word in rest:
-        if not word.startswith("-"):
-            names.append(word)
+    for given in rest:
+        if not given.startswith("-"):
+            names.append(given)
             continue
-        name, equals, _ = word.partition("=")
+        name, equals, _ = given.partition("=")
         _check_names(verb, own, [name])
-        passed.append(word)
+        passed.append(given)
         if takes[name] and not equals:
             passed.extend(islice(rest, 1))
-    return names, passed
+    if not names:
+        raise UsageError(f"batch {verb}: name the logs, a quoted pattern such as 'logs/*.mcap', or a manifest")
+    return own, names, passed
 
 
 def _options(own: TyperCommand) -> dict[str, bool]:
@@ -107,5 +115,7 @@ def _check_names(verb: str, own: TyperCommand, names: Collection[str]) -> None:
     for name in names:
         if name not in known:
             raise UsageError(f"{name} is no option of {verb}; see mcap-landmarks {verb} --help")
+        if name in _OF_ONE_LOG:
+            raise UsageError(f"{name} is for one log, and batch {verb} has many; run {verb} without batch for it")
         if name in _ONE_FILE.get(verb, ()):
             raise UsageError(f"{name} names one file, and batch {verb} has many logs; run {verb} without batch for it")

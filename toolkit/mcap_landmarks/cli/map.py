@@ -40,7 +40,8 @@ def command(
     use: options.Use = None,
     extrinsics: options.Extrinsics = None,
     fixed: options.Fixed = False,
-    collect: Annotated[Path | None, typer.Option("--collect", hidden=True)] = None,
+    parts: Annotated[Path | None, typer.Option("--parts", hidden=True)] = None,
+    collect: Annotated[bool, typer.Option("--collect", hidden=True)] = False,
 ) -> None:
     """Build one landmark map from LOG...; with -o also write each log with its results.
 
@@ -52,12 +53,12 @@ def command(
         _from_reference(logs, database, given)
         return
     asked = Given(given, images, scans, {"extrinsics": extrinsics}, use, ["build_map.fixed=true"] * fixed, segments)
-    if collect is not None:
-        _collect(asked.requests(logs), prior, collect, given)
+    if collect and parts is not None:
+        _collect(asked.requests(logs)[0], prior, parts, given)
         return
     from mcap_landmarks.runs.build_map import build_map_of
 
-    run = build_map_of(asked.requests(logs), database, output, prior, progress)
+    run = build_map_of(asked.requests(logs), database, output, prior, progress, parts)
     for log in run.logs:
         tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)
         if log.excluded:
@@ -71,17 +72,16 @@ def command(
         raise typer.Exit(PARTIAL)
 
 
-def _collect(requests: "list[Request]", prior: Location | None, parts: Path, given: LogOptions) -> None:
-    """Leave what logs give to a map of many in a folder, for `batch map`."""
+def _collect(request: "Request", prior: Location | None, parts: Path, given: LogOptions) -> None:
+    """Leave what one log gives to a map of many in a folder, for `batch map`."""
     from mcap_landmarks.runs.build_map import collect_for_map
 
-    found = [collect_for_map(request, prior, parts, progress) for request in requests]
-    for log in found:
-        tell(log.recording, log.stages, log.outcome.notes, log.outcome.losses)
+    log = collect_for_map(request, prior, parts, progress)
+    tell(log.recording, log.stages, log.outcome.notes, log.outcome.losses)
     if given.json:
-        logs = [{"path": str(log.recording), "fingerprint": log.fingerprint, **told(log.stages)} for log in found]
-        say_json("map", {"logs": logs})
-    if any(log.outcome.losses for log in found):
+        found = {"path": str(log.recording), "fingerprint": log.fingerprint, "bundles": log.outcome.bundles}
+        say_json("map_log", {**found, **told(log.stages), "losses": list(log.outcome.losses)})
+    if log.outcome.losses:
         raise typer.Exit(PARTIAL)
 
 

@@ -42,7 +42,8 @@ def build_map(task: MapTask, watch: Watch = unwatched) -> MapRun:
     """
     check_apart([task.database, *task.outputs.values()], task.reads())
     with ExitStack() as stack:
-        parts = stack.enter_context(parts_folder(task.database))
+        stack.enter_context(held(task.database))
+        parts = task.parts or stack.enter_context(parts_folder(task.database))
         for output in task.outputs.values():
             stack.enter_context(held(output))
         plan = plan_map(task, parts)
@@ -70,13 +71,14 @@ def build_map_of(
     output: Location | None = None,
     prior: Location | None = None,
     watch: Watch = unwatched,
+    parts: Path | None = None,
 ) -> MapRun:
     """`build_map` of logs, which are written with their results to `output` if there is one; raises the same."""
     if output is None:
-        return build_map(MapTask(tuple(requests), database, prior=prior), watch)
+        return build_map(MapTask(tuple(requests), database, prior=prior, parts=parts), watch)
     with no_empty_folder(output):
         outputs = output_files([request.recording for request in requests], output)
-        return build_map(MapTask(tuple(requests), database, outputs, prior), watch)
+        return build_map(MapTask(tuple(requests), database, outputs, prior, parts), watch)
 
 
 def _check_replaceable(plan: MapPlan) -> None:

@@ -29,12 +29,16 @@ from mcap_landmarks.stages.build_map import STAGE
 
 @dataclass(frozen=True, slots=True)
 class MapTask:
-    """The logs of a map (their settings are the first one's), the database, each log's output, a map to extend."""
+    """The logs of a map (their settings are the first one's), the database, each log's output, a map to extend.
+
+    `parts` is where workers left what logs give to it, which stays; without one it is a folder of its own.
+    """
 
     requests: tuple[Request, ...]
     database: Location
     outputs: Mapping[Location, Location] = field(default_factory=dict)
     prior: Location | None = None
+    parts: Path | None = None
 
     @property
     def files(self) -> dict[str, Location]:

@@ -1,0 +1,135 @@
+"""One landmark map of a batch's logs: workers gather what each gives to it, then this process solves it."""
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from mcap_landmarks.cli.batch_options import BatchOptions
+from mcap_landmarks.cli.batch_reports import Report, counts_of, print_reports, say_errors
+from mcap_landmarks.cli.batch_tasks import ONE_THREAD, split, word
+from mcap_landmarks.cli.console import DONE, PARTIAL, UNUSABLE, say, say_json, warn
+from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location, location
+from mcap_landmarks.wording import counted
+
+if TYPE_CHECKING:
+    from mcap_landmarks.fleet.tasks import Ended, Task
+
+_NAME = "map.db"
+
+
+def map_logs(words: Sequence[str], output: Location, batch: BatchOptions, *, prints_json: bool) -> None:
+    """Build the map of all logs that can be read; those that cannot, or that do not fit the others, are named.
+
+    What the logs gave stays beside the map as long as one of them failed, so that the next try begins there.
+
+    Raises:
+        UsageError: an option, a manifest or an output makes no sense.
+        typer.Exit: a log failed or does not fit, or there is no map.
+    """
+    from mcap_landmarks.runs.outputs import make_folder
+    from mcap_landmarks.runs.session import parts_folder
+
+    own, names, passed = split("map", words)
+    folder = make_folder(output)
+    database, options = _database(passed, folder)
+    with parts_folder(database) as parts:
+        tasks = _tasks(names, database, parts, options)
+        own.make_context("map", list(tasks[0].words[1:]))
+        reports = _gathered(tasks, batch)
+        counts = counts_of(reports)
+        good = [task for task, report in zip(tasks, reports, strict=True) if report["outcome"] != "failed"]
+        solved = _solved(good, database, parts, options) if good else None
+        _tell(reports, solved)
+        document = _document(solved)
+        if prints_json:
+            say_json("batch", {"verb": "map", **counts, "logs": reports, **({"map": document} if document else {})})
+        elif not batch.prints_events:
+            print_reports("map", reports, counts)
+            _print(document)
+        say_errors(reports)
+        if solved is None or solved.exit_code not in {DONE, PARTIAL}:
+            raise typer.Exit(solved.exit_code if solved is not None else UNUSABLE)
+        if counts["failed"]:  # inside the block, so that the parts stay
+            warn(f"note: {parts}: what the other logs gave stays here for the next run")
+            raise typer.Exit(PARTIAL)
+    if counts["partial"] or solved.exit_code == PARTIAL:
+        raise typer.Exit(PARTIAL)
+
+
+def _database(passed: Sequence[str], folder: Location) -> tuple[Location, tuple[str, ...]]:
+    """Where the map goes, and the options without that."""
+    database, options = folder / _NAME, list[str]()
+    rest = iter(passed)
+    for given in rest:
+        name, equals, value = given.partition("=")
+        if name == "--map":
+            database = location(value if equals else next(rest, ""))
+        else:
+            options.append(given)
+    return database, (*ONE_THREAD, *options)
+
+
+def _tasks(names: Sequence[str], database: Location, parts: Path, options: Sequence[str]) -> "list[Task]":
+    """What workers do: one log each."""
+    from mcap_landmarks.fleet.inputs import find_logs
+    from mcap_landmarks.fleet.tasks import Task
+
+    logs = find_logs(names)
+    if any(log.options for log in logs):
+        raise UsageError("batch map makes one map, with the same options for all logs; give them here, not by log")
+    where = ("--map", word(database), "--parts", str(parts), "--collect", "--json")
+    return [Task(log.place, database, ("map", word(log.place), *where, *options)) for log in logs]
+
+
+def _gathered(tasks: "Sequence[Task]", batch: BatchOptions) -> list[Report]:
+    from mcap_landmarks.cli.batch_events import event_lines
+    from mcap_landmarks.cli.batch_run import run_batch
+    from mcap_landmarks.cli.batch_table import live_table
+
+    with event_lines(batch.events) as lines, live_table("map", len(tasks)) as shown:
+        return run_batch("map", tasks, batch.crew(len(tasks)), batch.limits(), [lines, shown])
+
+
+def _solved(tasks: "Sequence[Task]", database: Location, parts: Path, options: Sequence[str]) -> "Ended":
+    """The map of the logs whose parts are there, by the words that make it in one process."""
+    from mcap_landmarks.cli.main import run
+    from mcap_landmarks.fleet.tasks import Task
+    from mcap_landmarks.fleet.worker import run_task
+
+    warn(f"{database}: solving the map of {counted(len(tasks), 'log')}")
+    logs = [word(task.log) for task in tasks]
+    kept = [option for option in options if option != "--force"]  # workers have made the parts anew
+    where = ("--map", word(database), "--parts", str(parts), "--json")
+    return run_task(Task(database, database, ("map", *logs, *where, *kept)), run)
+
+
+def _tell(reports: Sequence[Report], solved: "Ended | None") -> None:
+    """What is to be said of the logs and of the map, each once."""
+    for line in dict.fromkeys(_lines(reports, solved)):
+        warn(line)
+
+
+def _lines(reports: Sequence[Report], solved: "Ended | None") -> Iterator[str]:
+    for report in reports:
+        yield from report["notes"]
+    if solved is not None:
+        yield from (line for line in solved.stderr.splitlines() if line.startswith(("note: ", "warning: ", "error: ")))
+
+
+def _document(solved: "Ended | None") -> dict[str, object] | None:
+    """The map's own document."""
+    try:
+        found: dict[str, object] | None = json.loads(solved.stdout) if solved is not None else None
+    except ValueError:
+        return None
+    return found
+
+
+def _print(document: dict[str, object] | None) -> None:
+    if document is not None and "database" in document:
+        tentative = document["tentative"]
+        say(f"{document['database']}: {counted(int(str(document['landmarks'])), 'landmark')}, {tentative} tentative")
