@@ -40,23 +40,28 @@ def map_logs(words: Sequence[str], output: Location, batch: BatchOptions, *, pri
         tasks = _tasks(names, database, parts, options)
         own.make_context("map", list(tasks[0].words[1:]))
         reports = _gathered(tasks, batch)
-        counts = counts_of(reports)
         good = [task for task, report in zip(tasks, reports, strict=True) if report["outcome"] != "failed"]
         solved = _solved(good, database, parts, options) if good else None
-        _tell(reports, solved)
-        document = _document(solved)
-        if prints_json:
-            say_json("batch", {"verb": "map", **counts, "logs": reports, **({"map": document} if document else {})})
-        elif not batch.prints_events:
-            print_reports("map", reports, counts)
-            _print(document)
+        for line in dict.fromkeys(_lines(reports, solved)):
+            warn(line)
+        if prints_json or not batch.prints_events:
+            _show(reports, solved, prints_json=prints_json)
         say_errors(reports)
-        if solved is None or solved.exit_code not in {DONE, PARTIAL}:
-            raise typer.Exit(solved.exit_code if solved is not None else UNUSABLE)
-        if counts["failed"]:  # inside the block, so that the parts stay
-            warn(f"note: {parts}: what the other logs gave stays here for the next run")
-            raise typer.Exit(PARTIAL)
-    if counts["partial"] or solved.exit_code == PARTIAL:
+        _end(reports, solved, parts)
+    if any(ended != DONE for ended in (solved.exit_code if solved else DONE, *(one["exit_code"] for one in reports))):
+        raise typer.Exit(PARTIAL)
+
+
+def _end(reports: Sequence[Report], solved: "Ended | None", parts: Path) -> None:
+    """End with what became of all; the block where the parts lie goes well only if no log failed.
+
+    Raises:
+        typer.Exit: there is no map, or a log failed.
+    """
+    if solved is None or solved.exit_code not in {DONE, PARTIAL}:
+        raise typer.Exit(solved.exit_code if solved is not None else UNUSABLE)
+    if any(report["outcome"] == "failed" for report in reports):
+        warn(f"note: {parts}: what the other logs gave stays here for the next run")
         raise typer.Exit(PARTIAL)
 
 
@@ -107,12 +112,6 @@ def _solved(tasks: "Sequence[Task]", database: Location, parts: Path, options: S
     return run_task(Task(database, database, ("map", *logs, *where, *kept)), run)
 
 
-def _tell(reports: Sequence[Report], solved: "Ended | None") -> None:
-    """What is to be said of the logs and of the map, each once."""
-    for line in dict.fromkeys(_lines(reports, solved)):
-        warn(line)
-
-
 def _lines(reports: Sequence[Report], solved: "Ended | None") -> Iterator[str]:
     for report in reports:
         yield from report["notes"]
@@ -129,7 +128,13 @@ def _document(solved: "Ended | None") -> dict[str, object] | None:
     return found
 
 
-def _print(document: dict[str, object] | None) -> None:
+def _show(reports: Sequence[Report], solved: "Ended | None", *, prints_json: bool) -> None:
+    """What became of the logs and of the map, on stdout."""
+    counts, document = counts_of(reports), _document(solved)
+    if prints_json:
+        say_json("batch", {"verb": "map", **counts, "logs": reports, **({"map": document} if document else {})})
+        return
+    print_reports("map", reports, counts)
     if document is not None and "database" in document:
-        tentative = document["tentative"]
-        say(f"{document['database']}: {counted(int(str(document['landmarks'])), 'landmark')}, {tentative} tentative")
+        landmarks, tentative = int(str(document["landmarks"])), document["tentative"]
+        say(f"{document['database']}: {counted(landmarks, 'landmark')}, {tentative} tentative")

@@ -25,6 +25,7 @@ _NOT_VERBS = {
     "stage_runs",
     "batch_catalogue",
     "batch_events",
+    "batch_map",
     "batch_options",
     "batch_reports",
     "batch_run",
