@@ -50,6 +50,16 @@ def hang(path: Path) -> None:
         time.sleep(3600)
 
 
+def spin(path: Path) -> None:
+    """As `hang`, but at work."""
+    partial = path.with_suffix(".partial")
+    partial.touch()
+    with contextlib.ExitStack() as stack:
+        stack.callback(partial.unlink)
+        while True:
+            time.sleep(0.001)
+
+
 def grow(_path: Path) -> None:
     """Take more and more memory."""
     held = []
@@ -58,4 +68,4 @@ def grow(_path: Path) -> None:
         time.sleep(0.005)
 
 
-ACTIONS = {action.__name__: action for action in (tiny, fail, die_once, die, hang, grow)}
+ACTIONS = {action.__name__: action for action in (tiny, fail, die_once, die, hang, spin, grow)}

@@ -57,7 +57,7 @@ def command(
             event_lines(batch.events) as lines,
             live_table(verb, len(tasks)) as shown,
         ):
-            reports = run_batch(verb, tasks, batch.crew(len(tasks)), limits, [lines, shown, rows])
+            reports = run_batch(verb, tasks, batch.crew(tasks), limits, [lines, shown, rows])
     for report in reports:
         for note in report["notes"]:
             warn(note)

@@ -2,16 +2,21 @@
 
 import os
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mcap_landmarks import memory
-from mcap_landmarks.errors import UsageError
+from mcap_landmarks.cli.console import warn
+from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.locations import Location, location
 
 if TYPE_CHECKING:
-    from mcap_landmarks.fleet.tasks import TaskLimits, Workers
+    from collections.abc import Sequence
+
+    from mcap_landmarks.fleet.tasks import Task, TaskLimits, Workers
+    from mcap_landmarks.vision.config import ProviderChoice
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +32,14 @@ class BatchOptions:
     memory_limit: Annotated[
         str | None,
         typer.Option("--memory-limit", metavar="SIZE", help="End a log whose process grows larger, such as 4G."),
+    ] = None
+    ray: Annotated[
+        str | None,
+        typer.Option(
+            "--ray",
+            metavar="ADDRESS",
+            help="Work on a Ray cluster: auto, HOST:PORT or ray://HOST:PORT; local starts one here (extra cluster).",
+        ),
     ] = None
     events: Annotated[
         Location | None,
@@ -62,9 +75,37 @@ class BatchOptions:
             raise UsageError(f"--time-limit {self.time_limit}: give seconds, more than none")
         return TaskLimits(self.time_limit, memory.size(self.memory_limit, "--memory-limit"))
 
-    def crew(self, tasks: int) -> "Workers":
-        """The workers for so many tasks."""
-        from mcap_landmarks.cli.main import run
-        from mcap_landmarks.fleet.local_workers import LocalWorkers
+    def crew(self, tasks: "Sequence[Task]") -> "Workers":
+        """The workers for some tasks.
 
-        return LocalWorkers(min(self.workers or len(os.sched_getaffinity(0)), tasks), run)
+        Raises:
+            ToolkitError: Ray is asked for, and not installed.
+        """
+        from mcap_landmarks.cli.main import run
+
+        if self.ray is None:
+            from mcap_landmarks.fleet.local_workers import LocalWorkers
+
+            return LocalWorkers(min(self.workers or len(os.sched_getaffinity(0)), len(tasks)), run)
+        try:
+            from mcap_landmarks.fleet.on_ray.ray_workers import RayWorkers
+        except ModuleNotFoundError as error:
+            raise ToolkitError(f"{error.name} is not installed: pip install 'mcap-landmarks[cluster]'") from error
+        return RayWorkers(run, self.ray, self.workers, provider=provider_of(tasks[0].words), say=warn)
+
+
+def provider_of(words: "Sequence[str]") -> "ProviderChoice":
+    """What runs the network of a verb with these words."""
+    from mcap_landmarks.config import gather, load
+    from mcap_landmarks.vision.config import DetectConfig
+
+    files, settings = _values(words, "--config"), _values(words, "--set")
+    config = load("detect", gather(location(files[-1]) if files else None, settings, None))
+    assert isinstance(config, DetectConfig)  # noqa: S101 - as its stage declares it
+    return config.provider
+
+
+def _values(words: "Sequence[str]", option: str) -> list[str]:
+    """The values of an option among the words of a verb."""
+    apart = [value for name, value in pairwise(words) if name == option]
+    return apart or [word.partition("=")[2] for word in words if word.startswith(f"{option}=")]

@@ -1,7 +1,10 @@
 """Tasks that did not come to an end of their own, in words: limits, signals, and what to do about them."""
 
+import contextlib
 import signal
 
+from mcap_landmarks.atomic import held
+from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.fleet.tasks import Cut, Ended, Task, TaskLimits
 from mcap_landmarks.memory import shown
 
@@ -30,6 +33,12 @@ def was_killed(task: Task, exit_code: int | None, seconds: float, peak_bytes: in
     how = f"was killed by signal {-code}" if code < 0 else f"lost its process, which exited with {code}"
     what = f"{how}; if nobody did that, the machine lacks memory for so many --workers"
     return _cut("killed", task, code, what, seconds, peak_bytes, attempt)
+
+
+def clear(task: Task) -> None:
+    """Remove what a task left half written that cannot do so itself any more."""
+    with contextlib.suppress(ToolkitError), held(task.output):
+        pass
 
 
 def _cut(

@@ -15,9 +15,7 @@ from queue import Empty, SimpleQueue
 import psutil
 from pebble import ProcessPool
 
-from mcap_landmarks.atomic import held
-from mcap_landmarks.errors import ToolkitError
-from mcap_landmarks.fleet.cuts import over_memory, over_time, was_killed
+from mcap_landmarks.fleet.cuts import clear, over_memory, over_time, was_killed
 from mcap_landmarks.fleet.tasks import TRIES, CommandLine, Ended, Started, Task, TaskLimits
 from mcap_landmarks.fleet.worker import INTERRUPTED, run_task, use_one_thread
 
@@ -55,7 +53,7 @@ class LocalWorkers:
                     waiting.append((ended.task, ended.attempts + 1))
                     continue
                 if ended.cut is not None:
-                    _clear(ended.task)
+                    clear(ended.task)
                 yield ended
 
 
@@ -203,12 +201,6 @@ def _next_end(crew: Sequence[_Worker], news: _News, limits: TaskLimits, started:
         worker.pid = pid
         started(worker.job.task, pid)
     return None
-
-
-def _clear(task: Task) -> None:
-    """Remove what a task left half written that cannot do so itself any more."""
-    with contextlib.suppress(ToolkitError), held(task.output):
-        pass
 
 
 def _begin() -> None:
