@@ -16,6 +16,7 @@ from mcap_landmarks.locations import Location, location
 from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
+    from mcap_landmarks.fleet.inputs import FleetLog
     from mcap_landmarks.fleet.tasks import Ended, Task
 
 _NAME = "map.db"
@@ -30,16 +31,17 @@ def map_logs(words: Sequence[str], output: Location, batch: BatchOptions, *, pri
         UsageError: an option, a manifest or an output makes no sense.
         typer.Exit: a log failed or does not fit, or there is no map.
     """
+    from mcap_landmarks.fleet.inputs import find_logs
     from mcap_landmarks.runs.outputs import make_folder
     from mcap_landmarks.runs.session import parts_folder
 
     own, names, passed = split("map", words)
-    folder = make_folder(output)
-    database, options = _database(passed, folder)
+    logs = find_logs(names)
+    database, options = _database((*_of_all(logs), *passed), make_folder(output))
     with parts_folder(database) as parts:
-        tasks = _tasks(names, database, parts, options)
+        tasks = _tasks(logs, database, parts, options)
         own.make_context("map", list(tasks[0].words[1:]))
-        reports = _gathered(tasks, batch)
+        reports, is_catalogue_lost = _gathered(tasks, batch)
         good = [task for task, report in zip(tasks, reports, strict=True) if report["outcome"] != "failed"]
         solved = _solved(good, database, parts, options) if good else None
         for line in dict.fromkeys(_lines(reports, solved)):
@@ -48,7 +50,8 @@ def map_logs(words: Sequence[str], output: Location, batch: BatchOptions, *, pri
             _show(reports, solved, prints_json=prints_json)
         say_errors(reports)
         _end(reports, solved, parts)
-    if any(ended != DONE for ended in (solved.exit_code if solved else DONE, *(one["exit_code"] for one in reports))):
+    codes = [solved.exit_code if solved else DONE, *(report["exit_code"] for report in reports)]
+    if is_catalogue_lost or any(code != DONE for code in codes):
         raise typer.Exit(PARTIAL)
 
 
@@ -78,25 +81,42 @@ def _database(passed: Sequence[str], folder: Location) -> tuple[Location, tuple[
     return database, (*ONE_THREAD, *options)
 
 
-def _tasks(names: Sequence[str], database: Location, parts: Path, options: Sequence[str]) -> "list[Task]":
+def _of_all(logs: "Sequence[FleetLog]") -> tuple[str, ...]:
+    """The options that a manifest gives to all logs.
+
+    Raises:
+        UsageError: it gives them others, though they are for one map.
+    """
+    from mcap_landmarks.fleet.fleet_manifest import words_of
+
+    options = {words_of(log.options) for log in logs}
+    if len(options) > 1:
+        raise UsageError("batch map makes one map, with the same options for all logs; give them under [options]")
+    return options.pop()
+
+
+def _tasks(logs: "Sequence[FleetLog]", database: Location, parts: Path, options: Sequence[str]) -> "list[Task]":
     """What workers do: one log each."""
-    from mcap_landmarks.fleet.inputs import find_logs
     from mcap_landmarks.fleet.tasks import Task
 
-    logs = find_logs(names)
-    if any(log.options for log in logs):
-        raise UsageError("batch map makes one map, with the same options for all logs; give them here, not by log")
     where = ("--map", word(database), "--parts", str(parts), "--collect", "--json")
     return [Task(log.place, database, ("map", word(log.place), *where, *options)) for log in logs]
 
 
-def _gathered(tasks: "Sequence[Task]", batch: BatchOptions) -> list[Report]:
+def _gathered(tasks: "Sequence[Task]", batch: BatchOptions) -> tuple[list[Report], bool]:
+    """What became of the logs, and whether the catalogue could not be written."""
+    from mcap_landmarks.cli.batch_catalogue import batch_rows
     from mcap_landmarks.cli.batch_events import event_lines
     from mcap_landmarks.cli.batch_run import run_batch
     from mcap_landmarks.cli.batch_table import live_table
 
-    with event_lines(batch.events) as lines, live_table("map", len(tasks)) as shown:
-        return run_batch("map", tasks, batch.crew(len(tasks)), batch.limits(), [lines, shown])
+    with (
+        batch_rows(batch.catalogue, tasks) as rows,
+        event_lines(batch.events) as lines,
+        live_table("map", len(tasks)) as shown,
+    ):
+        reports = run_batch("map", tasks, batch.crew(len(tasks)), batch.limits(), [lines, shown, rows])
+    return reports, rows.is_lost
 
 
 def _solved(tasks: "Sequence[Task]", database: Location, parts: Path, options: Sequence[str]) -> "Ended":

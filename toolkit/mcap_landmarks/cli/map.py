@@ -40,7 +40,7 @@ def command(
     use: options.Use = None,
     extrinsics: options.Extrinsics = None,
     fixed: options.Fixed = False,
-    parts: Annotated[Path | None, typer.Option("--parts", hidden=True)] = None,
+    parts: Annotated[str | None, typer.Option("--parts", hidden=True)] = None,
     collect: Annotated[bool, typer.Option("--collect", hidden=True)] = False,
 ) -> None:
     """Build one landmark map from LOG...; with -o also write each log with its results.
@@ -53,12 +53,13 @@ def command(
         _from_reference(logs, database, given)
         return
     asked = Given(given, images, scans, {"extrinsics": extrinsics}, use, ["build_map.fixed=true"] * fixed, segments)
-    if collect and parts is not None:
-        _collect(asked.requests(logs)[0], prior, parts, given)
+    left = None if parts is None else Path(parts)  # by `batch map`, on this machine
+    if collect and left is not None:
+        _collect(asked.requests(logs)[0], prior, left, given)
         return
     from mcap_landmarks.runs.build_map import build_map_of
 
-    run = build_map_of(asked.requests(logs), database, output, prior, progress, parts)
+    run = build_map_of(asked.requests(logs), database, output, prior, progress, left)
     for log in run.logs:
         tell(log.recording, _stages(run, log), log.outcome.notes, log.outcome.losses)
         if log.excluded:
