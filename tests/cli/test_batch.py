@@ -1,6 +1,8 @@
 """A verb over many logs from the command line: outputs, documents, exit codes, wrong usage."""
 
 import json
+import resource
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import jsonschema
@@ -9,8 +11,11 @@ from mcap_landmarks.channels import ODOMETRY
 from mcap_landmarks.cli.batch_events import EventLines
 from mcap_landmarks.cli.batch_options import BatchOptions
 from mcap_landmarks.cli.batch_reports import Report
+from mcap_landmarks.cli.batch_run import run_batch
 from mcap_landmarks.cli.batch_table import LiveTable
-from mcap_landmarks.fleet.tasks import Ended, Task
+from mcap_landmarks.cli.batch_tasks import tasks_of
+from mcap_landmarks.errors import UsageError
+from mcap_landmarks.fleet.tasks import Ended, Started, Task, TaskLimits
 from mcap_landmarks.recording.reader import open_recording
 
 from tests.cli.calls import call, schema_of
@@ -195,3 +200,34 @@ def test_events_are_lines_that_are_there_at_once(tmp_path: Path) -> None:
         ("retried", 8),
         ("ended", None),
     ]
+
+
+class Stopped:
+    """Workers of which one ends and the next hears Ctrl-C."""
+
+    def run(self, tasks: Sequence[Task], _limits: TaskLimits, _started: Started) -> Iterator[Ended]:
+        """See `fleet.tasks.Workers`."""
+        yield Ended(tasks[0], 0, "", "", 1.0, None, 1)
+        raise KeyboardInterrupt
+
+
+def test_ctrl_c_tells_what_is_finished(capsys: pytest.CaptureFixture[str]) -> None:
+    tasks = [Task(Path(f"{name}.mcap"), Path(f"out/{name}.mcap"), ("localize",)) for name in "abc"]
+    with pytest.raises(KeyboardInterrupt):
+        run_batch("localize", tasks, Stopped(), TaskLimits(), [])
+    assert "1 of 3 logs are finished; the same command goes on with the others" in capsys.readouterr().err
+
+
+def test_many_documents_need_no_more_open_files_than_few(tmp_path: Path) -> None:
+    for number in range(300):
+        (tmp_path / f"{number}.mcap").touch()
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (256, before[1]))
+    try:
+        tasks = tasks_of("evaluate", [str(tmp_path / "*.mcap")], tmp_path / "figures")
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+    assert len(tasks) == 300
+    Path(str(tasks[7].output)).write_text("{}")
+    with pytest.raises(UsageError, match="replace it with --overwrite"):
+        tasks_of("evaluate", [str(tmp_path / "*.mcap")], tmp_path / "figures")

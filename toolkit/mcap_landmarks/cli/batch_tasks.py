@@ -8,7 +8,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.locations import Location, Url
+from mcap_landmarks.locations import Location, Url, address
 
 if TYPE_CHECKING:
     from mcap_landmarks.fleet.tasks import Task
@@ -52,7 +52,7 @@ def tasks_of(verb: str, words: Sequence[str], output: Location) -> "list[Task]":
             _check_names(verb, own, [f"--{name}" for name in log.options])
             own.make_context(verb, list(tasks[-1].words[1:]))
     if verb == "evaluate":
-        _check_documents(tasks, [log.place for log in logs], overwrite="--overwrite" in passed)
+        _check_documents(tasks, [log.place for log in logs])
     return tasks
 
 
@@ -61,12 +61,17 @@ def word(place: Location) -> str:
     return place.text if isinstance(place, Url) else str(place)
 
 
-def _check_documents(tasks: "Sequence[Task]", logs: Sequence[Location], *, overwrite: bool) -> None:
-    """Refuse to replace what is there by the documents that are kept here, before anything runs."""
+def _check_documents(tasks: "Sequence[Task]", logs: Sequence[Location]) -> None:
+    """Refuse to replace what is there by the documents that are kept here, before anything runs: one after the other,
+    as a process may hold few files open.
+    """
     from mcap_landmarks.runs.replacing import new_files
 
-    with new_files([task.output for task in tasks], logs, overwrite=overwrite):
-        pass
+    read = {address(log): log for log in logs}
+    for task in tasks:
+        also = read.get(address(task.output), task.log)
+        with new_files([task.output], [also], overwrite="--overwrite" in task.words):
+            pass
 
 
 def _command_of(verb: str) -> TyperCommand:
