@@ -115,7 +115,7 @@ def _gathered(tasks: "Sequence[Task]", batch: BatchOptions) -> tuple[list[Report
         event_lines(batch.events) as lines,
         live_table("map", len(tasks)) as shown,
     ):
-        reports = run_batch("map", tasks, batch.crew(len(tasks)), batch.limits(), [lines, shown, rows])
+        reports = run_batch("map", tasks, batch.crew(tasks), batch.limits(), [lines, shown, rows])
     return reports, rows.is_lost
 
 
