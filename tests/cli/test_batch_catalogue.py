@@ -14,6 +14,7 @@ from mcap_landmarks.catalogue.catalogue_columns import COLUMNS, Row
 from mcap_landmarks.catalogue.catalogue_file import read_catalogue
 from mcap_landmarks.fleet.local_workers import LocalWorkers
 from mcap_landmarks.fleet.tasks import Ended
+from mcap_landmarks.maps.database import read_map
 from mcap_landmarks.recording.reader import open_recording
 
 from tests.cli.calls import call, refused
@@ -87,6 +88,20 @@ def check_localized(first: Row, again: Row, other: Row) -> None:
     assert first["run_key"] == again["run_key"] != other["run_key"]
     differ = {name for name in COLUMNS if first[name] != again[name]}
     assert differ <= TIMED | {"outcome"}
+
+
+@pytest.mark.slow
+def test_the_logs_of_one_map_share_it(folder: Path, tmp_path: Path) -> None:
+    words = ("batch", "map", folder / "logs" / "*.mcap", "-o", tmp_path, "--workers", 1)
+    assert call(*words, "--catalogue", tmp_path / "runs.db") == 3
+    first, second, failed = read_catalogue(tmp_path / "runs.db").rows
+    assert [first["output"], second["output"], failed["output"]] == [*[str(tmp_path / "map.db")] * 2, None]
+    assert first["bundles"] == second["bundles"] == 40
+    assert first["landmarks"] == second["landmarks"] == len(read_map(tmp_path / "map.db"))
+    assert first["run_key"] == second["run_key"]
+    assert "build_map" in json.loads(str(first["settings"]))
+    assert None not in {first["fingerprint"], second["fingerprint"]}
+    assert first["fingerprint"] != second["fingerprint"]
 
 
 def test_of_a_batch_that_is_broken_off_the_rows_that_are_known_are_kept(

@@ -42,6 +42,18 @@ class BatchRows:
             row["output"] = kept_as(ended.task.output, self._place)
         self._rows.append(row)
 
+    def add_map(self, database: Location, document: object) -> None:
+        """The map of all logs that have not failed is there."""
+        if self._place is None:
+            return
+        from mcap_landmarks.catalogue.last_runs import kept_as
+        from mcap_landmarks.fleet.catalogue_rows import shared_by_logs
+
+        shared = {**shared_by_logs(database, document), "output": kept_as(database, self._place)}
+        for row in self._rows:
+            if row["outcome"] != "failed":
+                row.update(shared)
+
     def write(self) -> None:
         """Append the rows by log; where that cannot be it is said, as what the batch made is there all the same."""
         if self._place is None or not self._rows:

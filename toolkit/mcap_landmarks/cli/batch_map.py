@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from mcap_landmarks.cli.batch_catalogue import BatchRows, batch_rows
 from mcap_landmarks.cli.batch_options import BatchOptions
 from mcap_landmarks.cli.batch_reports import Report, counts_of, print_reports, say_errors
 from mcap_landmarks.cli.batch_tasks import ONE_THREAD, split, word
@@ -41,9 +42,11 @@ def map_logs(words: Sequence[str], output: Location, batch: BatchOptions, *, pri
     with parts_folder(database) as parts:
         tasks = _tasks(logs, database, parts, options)
         own.make_context("map", list(tasks[0].words[1:]))
-        reports, is_catalogue_lost = _gathered(tasks, batch)
-        good = [task for task, report in zip(tasks, reports, strict=True) if report["outcome"] != "failed"]
-        solved = _solved(good, database, parts, options) if good else None
+        with batch_rows(batch.catalogue, tasks) as rows:
+            reports = _gathered(tasks, batch, rows)
+            solved = _solved(_good(tasks, reports), database, parts, options)
+            if solved is not None and solved.exit_code in {DONE, PARTIAL}:
+                rows.add_map(database, _document(solved))
         for line in dict.fromkeys(_lines(reports, solved)):
             warn(line)
         if prints_json or not batch.prints_events:
@@ -51,7 +54,7 @@ def map_logs(words: Sequence[str], output: Location, batch: BatchOptions, *, pri
         say_errors(reports)
         _end(reports, solved, parts)
     codes = [solved.exit_code if solved else DONE, *(report["exit_code"] for report in reports)]
-    if is_catalogue_lost or any(code != DONE for code in codes):
+    if rows.is_lost or any(code != DONE for code in codes):
         raise typer.Exit(PARTIAL)
 
 
@@ -103,24 +106,23 @@ def _tasks(logs: "Sequence[FleetLog]", database: Location, parts: Path, options:
     return [Task(log.place, database, ("map", word(log.place), *where, *options)) for log in logs]
 
 
-def _gathered(tasks: "Sequence[Task]", batch: BatchOptions) -> tuple[list[Report], bool]:
-    """What became of the logs, and whether the catalogue could not be written."""
-    from mcap_landmarks.cli.batch_catalogue import batch_rows
+def _gathered(tasks: "Sequence[Task]", batch: BatchOptions, rows: BatchRows) -> list[Report]:
     from mcap_landmarks.cli.batch_events import event_lines
     from mcap_landmarks.cli.batch_run import run_batch
     from mcap_landmarks.cli.batch_table import live_table
 
-    with (
-        batch_rows(batch.catalogue, tasks) as rows,
-        event_lines(batch.events) as lines,
-        live_table("map", len(tasks)) as shown,
-    ):
-        reports = run_batch("map", tasks, batch.crew(tasks), batch.limits(), [lines, shown, rows])
-    return reports, rows.is_lost
+    with event_lines(batch.events) as lines, live_table("map", len(tasks)) as shown:
+        return run_batch("map", tasks, batch.crew(tasks), batch.limits(), [lines, shown, rows])
 
 
-def _solved(tasks: "Sequence[Task]", database: Location, parts: Path, options: Sequence[str]) -> "Ended":
-    """The map of the logs whose parts are there, by the words that make it in one process."""
+def _good(tasks: "Sequence[Task]", reports: Sequence[Report]) -> "list[Task]":
+    return [task for task, report in zip(tasks, reports, strict=True) if report["outcome"] != "failed"]
+
+
+def _solved(tasks: "Sequence[Task]", database: Location, parts: Path, options: Sequence[str]) -> "Ended | None":
+    """The map of the logs whose parts are there, by the words that make it in one process; None without a log."""
+    if not tasks:
+        return None
     from mcap_landmarks.cli.main import run
     from mcap_landmarks.fleet.tasks import Task
     from mcap_landmarks.fleet.worker import run_task

@@ -15,14 +15,10 @@ from mcap_landmarks.maps.database import read_manifest
 from mcap_landmarks.recording.reader import open_recording
 
 _STATUSES = ("localized", "ambiguous", "too_few_objects", "no_match", "inconsistent", "weak_geometry")
-_FIGURES: dict[str, dict[str, tuple[str | int, ...]]] = {
+_FIGURES: dict[str, dict[str, tuple[str, ...]]] = {
     "convert": {"messages": ("read",), "lost": ("lost",)},
     "detect": {"images": ("images",), "detections": ("detections",)},
-    "map": {
-        "bundles": ("logs", 0, "bundles"),
-        "landmarks": ("landmarks",),
-        "tentative": ("tentative",),
-    },
+    "map": {"bundles": ("bundles",)},
     "localize": {"bundles": ("bundles",), **{name: ("statuses", name) for name in _STATUSES}},
     "evaluate": {
         "bundles": ("bundles",),
@@ -62,7 +58,7 @@ class Told:
 def row_of(ended: Ended, told_of: Told, position: int, started: datetime) -> Row:
     """The row of a task, the one at `position` of its batch, which `started` then."""
     task, document = ended.task, told_of.document
-    has_output = told_of.outcome != "failed"
+    has_output = told_of.outcome != "failed" and task.verb != "map"  # the map of all logs is not there yet
     kept = None
     if has_output:
         kept = task.log if task.verb == "evaluate" else task.output
@@ -95,14 +91,21 @@ def _made_of(kept: Location | None, log: Location) -> Row:
     else:
         recorded, fingerprint = _recorded(kept or log)
         entries = dict(recorded) if kept is not None else {}
+    return {"fingerprint": fingerprint, **_decided(entries)}
+
+
+def shared_by_logs(database: Location, document: object) -> Row:
+    """What the rows of all logs of one map have of it; `document` is what its verb printed."""
+    counts = {name: _figure(name, document, (name,)) for name in ("landmarks", "tentative")}
+    return {"output": str(database), **_decided(read_manifest(database)), **counts}
+
+
+def _decided(entries: Mapping[str, str]) -> Row:
+    """Key and settings of a run, as a manifest tells them."""
     stages: dict[str, dict[str, object]] = told(entries.get("stages"), {})
     deciding = {name: entries.get(name) for name in _DECIDING}
     deciding["stages"] = entry_text({name: stage.get("key") for name, stage in stages.items()})
-    return {
-        "fingerprint": fingerprint,
-        "run_key": text_hash(entry_text(deciding)) if entries else None,
-        "settings": entries.get("config"),
-    }
+    return {"run_key": text_hash(entry_text(deciding)) if entries else None, "settings": entries.get("config")}
 
 
 def _recorded(place: Location) -> tuple[Mapping[str, str], str | None]:
@@ -114,24 +117,21 @@ def _recorded(place: Location) -> tuple[Mapping[str, str], str | None]:
 
 def _stage_seconds(document: object) -> Row:
     """The seconds of each stage that ran, by column."""
-    found = _at(document, ("seconds",)) or _at(document, ("logs", 0, "seconds"))
+    found = _at(document, ("seconds",))
     seconds = found if isinstance(found, Mapping) else {}
     return {f"seconds_{stage}": float(value) for stage, value in sorted(seconds.items())}
 
 
-def _figure(name: str, document: object, path: Sequence[str | int]) -> Value:
+def _figure(name: str, document: object, path: Sequence[str]) -> Value:
     value = _at(document, path)
     if not isinstance(value, (int, float)):
         return None
     return float(value) if COLUMNS[name] == "number" else int(value)
 
 
-def _at(document: object, path: Sequence[str | int]) -> object:
-    """What lies at a path of keys and places in JSON; None where there is nothing."""
+def _at(document: object, path: Sequence[str]) -> object:
+    """What lies at a path of keys in JSON; None where there is nothing."""
     value = document
     for key in path:
-        if isinstance(key, int):
-            value = value[key] if isinstance(value, list) and len(value) > key else None
-        else:
-            value = value.get(key) if isinstance(value, Mapping) else None
+        value = value.get(key) if isinstance(value, Mapping) else None
     return value

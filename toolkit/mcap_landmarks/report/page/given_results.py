@@ -41,7 +41,7 @@ def given_results(places: Sequence[Location], *, is_diff: bool) -> GivenResults:
             files.append(place)
             continue
         runs = last_runs(place)
-        files += [run.output for run in runs if run.output is not None]
+        files += dict.fromkeys(run.output for run in runs if run.output is not None)  # logs of one map share it
         missing += [UnreadResult(run.name, run.error) for run in runs if run.error is not None]
     once, notes = _each_once(files)
     return GivenResults(tuple(once), tuple(missing), tuple(notes), len(places) > 1 or bool(catalogues))
