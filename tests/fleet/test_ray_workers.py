@@ -167,6 +167,7 @@ def test_what_a_cluster_has_no_room_for_is_not_waited_for_without_end(
         (f"127.0.0.1:{free_port()}", ToolkitError, "nobody answers there .*; check that `ray status`"),
         (f"ray://127.0.0.1:{free_port()}", ToolkitError, "nobody answers there .*; check host and port"),
     ],
+    ids=["no-port", "empty-port", "nobody", "nobody-by-client"],  # tests are named alike in every process
 )
 def test_addresses_without_a_cluster_are_said(
     wrong: str, error: type[ToolkitError], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
