@@ -15,6 +15,7 @@ from mcap_landmarks.cli.batch_run import run_batch
 from mcap_landmarks.cli.batch_table import LiveTable
 from mcap_landmarks.cli.batch_tasks import tasks_of
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.fleet.cuts import over_memory
 from mcap_landmarks.fleet.tasks import Ended, Started, Task, TaskLimits
 from mcap_landmarks.recording.reader import open_recording
 
@@ -149,6 +150,67 @@ def test_wrong_usage_runs_nothing(folder: Path, tmp_path: Path, capsys: pytest.C
         assert call(*words, "-o", out) == 2
         assert reason in capsys.readouterr().err
     assert not out.exists() or not list(out.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("verb", "table", "said"),
+    [
+        (
+            "localize",
+            '[options]\noutput = "x"',
+            "[options]: output: batch sets this itself; -o of batch and `name` say",
+        ),
+        ("localize", "[options]\nworkers = 2", "[options]: workers: batch sets this itself; give --workers to batch"),
+        ("localize", "[options]\njson = true", "[options]: json: batch sets this itself"),
+        ("map", '[options]\nmap = "x.db"', "[options]: map: batch sets this itself"),
+        ("localize", '[options]\nforce = "yes"', "[options]: force = 'yes': force is a flag; give true or false"),
+        ("localize", "[options]\nodom = true", "[options]: odom = true: odom takes a value"),
+        ("localize", "[options]\nhelp = true", "[options]: help: --help is no option of localize"),
+        ("localize", '[options]\nmap = "no.db"', "[options]: map = 'no.db': there is no such file"),
+        ("localize", 'options.start = "noon"', "[[log]] 1: options.start = noon: give RFC 3339"),
+        ("map", 'options.prior = "no.db"', "[[log]] 1: options.prior = 'no.db': there is no such file"),
+    ],
+)
+def test_a_manifest_is_refused_by_file_table_and_key(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], verb: str, table: str, said: str
+) -> None:
+    """Before anything runs, also where the mistake is one that only the verb's own options tell."""
+    (tmp_path / "a.mcap").touch()
+    manifest = tmp_path / "fleet.toml"
+    log = '[[log]]\npath = "a.mcap"\n'
+    manifest.write_text(f"{table}\n{log}" if table.startswith("[") else f"{log}{table}\n")
+    more = () if "map =" in table or verb == "map" else ("--map", tmp_path / "a.mcap")
+    assert call("batch", verb, manifest, *more, "-o", tmp_path / "out") == 2
+    assert f"error: {manifest}: {said}" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_files_and_folders_that_no_worker_could_read_are_refused_at_once(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Names of networks are no files, and bags are logs."""
+    log, bag = tmp_path / "logs" / "a.mcap", tmp_path / "bag"
+    log.parent.mkdir()
+    bag.mkdir()
+    (bag / "metadata.yaml").touch()
+    for file in (log, bag / "a.mcap", tmp_path / "a.db"):
+        file.touch()
+    words = ("--map", str(tmp_path / "a.db"))
+    for given, reason in (
+        ((log, "--map", "no.db"), "error: --map no.db: there is no such file"),
+        ((log, *words, "--model", "no.onnx"), "error: --model no.onnx: there is no such file"),
+        ((log, *words, "--start", "noon"), "error: --start noon: give RFC 3339"),
+        ((log.parent, *words), f"logs is a folder of recordings; name them: '{log.parent}/*.mcap'"),
+        ((log,), "Try 'mcap-landmarks localize --help'"),
+    ):
+        assert call("batch", "localize", *given, "-o", tmp_path / "out") == 2
+        assert reason in capsys.readouterr().err
+    assert len(tasks_of("localize", [str(log), str(bag), *words, "--model", "nanodet"], tmp_path / "out")) == 2
+
+
+def test_a_memory_limit_is_said_as_it_was_written() -> None:
+    ended = over_memory(TASK, BatchOptions(memory_limit="50M").limits(), 1.0, 60_000_000, 1)
+    assert "took 60.0 MB, more than its --memory-limit of 50M; give it more" in ended.stderr
 
 
 TASK = Task(Path("a.mcap"), Path("out/a.mcap"), ("localize", "a.mcap"))

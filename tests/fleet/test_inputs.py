@@ -51,7 +51,7 @@ start = 2026-01-31T12:00:00Z
 end = 1769861000000000000
 
 [[log]]
-path = "/elsewhere/tuesday.mcap"
+path = "{elsewhere}"
 name = "second"
 options = { odom = "/wheels", force = true, lenient = false }
 
@@ -69,13 +69,17 @@ def test_a_manifest_gives_each_log_its_options(tmp_path: Path) -> None:
     with an output of its own.
     """
     file = tmp_path / "fleet.toml"
-    file.write_text(MANIFEST)
+    elsewhere = tmp_path / "elsewhere" / "tuesday.mcap"
+    file.write_text(MANIFEST.replace("{elsewhere}", str(elsewhere)))
+    for log in (tmp_path / "logs" / "monday.mcap", elsewhere):
+        log.parent.mkdir()
+        log.touch()
     first, second, third, fourth = find_logs([str(file), str(file)])
     assert (first.place, first.name) == (tmp_path / "logs" / "monday.mcap", None)
     settings = ("--set", "localize.max_sigma_m=0.3", "--set", "fuse.bearing_gate=4")
     span = ("--start", "2026-01-31T12:00:00+00:00", "--end", "1769861000000000000")
     assert words_of(first.options) == ("--map", "site.db", "--odom", "/odom", *settings, *span)
-    assert (second.place, second.name) == (Path("/elsewhere/tuesday.mcap"), "second")
+    assert (second.place, second.name) == (elsewhere, "second")
     assert words_of(second.options) == ("--map", "site.db", "--odom", "/wheels", *settings, "--force")
     outputs = [output.name for _, output in outputs_in(tmp_path, [first, second, third, fourth], ".mcap")]
     assert outputs == ["monday.mcap", "second.mcap", "whole.mcap", "wednesday.mcap"]
@@ -94,6 +98,11 @@ def test_a_manifest_gives_each_log_its_options(tmp_path: Path) -> None:
         ('[[log]]\npath = "a"\nnmae = "b"', "[[log]] 1: nmae is no key of a manifest; did you mean name?"),
         ('[[log]]\npath = "a"\nname = "x/b"', "[[log]] 1: name = 'x/b': give the output's name without folders"),
         ('[[log]]\npath = "a"\nstart = 1.5', "[[log]] 1: start = 1.5: give RFC 3339 with an offset"),
+        ('[[log]]\npath = "a"\nstart = "yesterday"', "[[log]] 1: start = yesterday: give RFC 3339 with an offset"),
+        ('[[log]]\npath = "a"\nend = 2026-01-31T12:00:00', "[[log]] 1: end = 2026-01-31T12:00:00: give RFC 3339 with"),
+        ('[[log]]\npath = "*.mcap"', "/*.mcap': patterns are for the command line; list each log"),
+        ('[[log]]\npath = "s3://bucket/*"', "[[log]] 1: path = 's3://bucket/*': patterns are for the command line"),
+        ('[[log]]\npath = "none.mcap"', "/none.mcap': there is no such file; name it from the manifest's folder"),
         ('[[log]]\npath = "a"\n[log.options]\nset = { a = 1 }', "[[log]] 1: options.set = {'a': 1}: give a table of"),
     ],
 )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from mcap_landmarks.cli.batch_catalogue import BatchRows, batch_rows
+from mcap_landmarks.cli.batch_checks import check_logs, check_values
 from mcap_landmarks.cli.batch_options import BatchOptions
 from mcap_landmarks.cli.batch_reports import Report, counts_of, print_reports, say_errors
 from mcap_landmarks.cli.batch_tasks import ONE_THREAD, split, word
@@ -38,10 +39,12 @@ def map_logs(words: Sequence[str], output: Location, batch: BatchOptions, *, pri
 
     own, names, passed = split("map", words)
     logs = find_logs(names)
+    check_logs("map", own, logs)
     database, options = _database((*_of_all(logs), *passed), make_folder(output))
+    words_of_one = (word(logs[0].place), "--map", word(database), *options)
+    check_values("map", own, words_of_one, logs[0], passed)
     with parts_folder(database) as parts:
         tasks = _tasks(logs, database, parts, options)
-        own.make_context("map", list(tasks[0].words[1:]))
         with batch_rows(batch.catalogue, tasks) as rows:
             reports = _gathered(tasks, batch, rows)
             solved = _solved(_good(tasks, reports), database, parts, options)

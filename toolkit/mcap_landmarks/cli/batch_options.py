@@ -73,7 +73,7 @@ class BatchOptions:
 
         if self.time_limit is not None and not 0 < self.time_limit < float("inf"):
             raise UsageError(f"--time-limit {self.time_limit}: give seconds, more than none")
-        return TaskLimits(self.time_limit, memory.size(self.memory_limit, "--memory-limit"))
+        return TaskLimits(self.time_limit, memory.size(self.memory_limit, "--memory-limit"), self.memory_limit)
 
     def crew(self, tasks: "Sequence[Task]") -> "Workers":
         """The workers for some tasks.

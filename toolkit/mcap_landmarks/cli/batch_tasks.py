@@ -1,12 +1,13 @@
 """The tasks of a batch: which logs, which output each, and the verb's options, checked before anything runs."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from itertools import islice
 from typing import TYPE_CHECKING
 
 import typer
-from typer.core import TyperCommand, TyperGroup, TyperOption
+from typer.core import TyperCommand, TyperGroup
 
+from mcap_landmarks.cli.batch_checks import check_logs, check_names, check_values, takes_value
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, Url, address
 
@@ -19,9 +20,6 @@ VERBS = {
     "evaluate": ".json",
 }
 """What a batch can do, and the suffix of its results."""
-_ONE_FILE = {"evaluate": ("--tum", "--thesis")}
-_OF_ONE_LOG = {"--from-reference", "--segments", "--parts", "--collect"}
-"""Options that make no sense for many logs; a batch has workers for its logs already."""
 _DETECTS = ("detect", "localize", "run")
 ONE_THREAD = ("--set", "detect.threads=1")
 """What workers are told that are as many as cores."""
@@ -43,14 +41,14 @@ def tasks_of(verb: str, words: Sequence[str], output: Location) -> "list[Task]":
     tasks: list[Task] = []
     checked: set[tuple[str, ...]] = set()
     logs = find_logs(names)
+    check_logs(verb, own, logs)
     for log, target in outputs_in(make_folder(output), logs, VERBS[verb]):
         options = (*threads, *words_of(log.options), *passed)
         where = () if verb == "evaluate" else ("-o", word(target))
         tasks.append(Task(log.place, target, (verb, word(log.place), *where, "--json", *options)))
         if options not in checked:
             checked.add(options)
-            _check_names(verb, own, [f"--{name}" for name in log.options])
-            own.make_context(verb, list(tasks[-1].words[1:]))
+            check_values(verb, own, tasks[-1].words[1:], log, passed)
     if verb == "evaluate":
         _check_documents(tasks, [log.place for log in logs])
     return tasks
@@ -92,7 +90,7 @@ def split(verb: str, words: Sequence[str]) -> tuple[TyperCommand, list[str], lis
         UsageError: there is no such verb or option, or no log is named.
     """
     own = _command_of(verb)
-    takes = _options(own)
+    takes = takes_value(own)
     names, passed = [], []
     rest = iter(words)
     for given in rest:
@@ -100,27 +98,10 @@ def split(verb: str, words: Sequence[str]) -> tuple[TyperCommand, list[str], lis
             names.append(given)
             continue
         name, equals, _ = given.partition("=")
-        _check_names(verb, own, [name])
+        check_names(verb, own, [name])
         passed.append(given)
         if takes[name] and not equals:
             passed.extend(islice(rest, 1))
     if not names:
         raise UsageError(f"batch {verb}: name the logs, a quoted pattern such as 'logs/*.mcap', or a manifest")
     return own, names, passed
-
-
-def _options(own: TyperCommand) -> dict[str, bool]:
-    """The options of a verb by name, and whether each takes a value."""
-    options = [option for option in own.params if isinstance(option, TyperOption)]
-    return {name: not option.is_flag for option in options for name in option.opts}
-
-
-def _check_names(verb: str, own: TyperCommand, names: Collection[str]) -> None:
-    known = _options(own)
-    for name in names:
-        if name not in known:
-            raise UsageError(f"{name} is no option of {verb}; see mcap-landmarks {verb} --help")
-        if name in _OF_ONE_LOG:
-            raise UsageError(f"{name} is for one log, and batch {verb} has many; run {verb} without batch for it")
-        if name in _ONE_FILE.get(verb, ()):
-            raise UsageError(f"{name} names one file, and batch {verb} has many logs; run {verb} without batch for it")

@@ -24,6 +24,7 @@ _NOT_VERBS = {
     "scenarios",
     "stage_runs",
     "batch_catalogue",
+    "batch_checks",
     "batch_events",
     "batch_map",
     "batch_options",

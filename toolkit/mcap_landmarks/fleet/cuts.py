@@ -20,7 +20,7 @@ def over_time(task: Task, limits: TaskLimits, seconds: float, peak_bytes: int | 
 
 def over_memory(task: Task, limits: TaskLimits, seconds: float, peak_bytes: int | None, attempt: int) -> Ended:
     """The end of a task that took more memory than it may."""
-    most, limit = shown(peak_bytes or 0), shown(limits.memory_bytes or 0)
+    most, limit = shown(peak_bytes or 0), limits.memory_text or shown(limits.memory_bytes or 0)
     what = f"took {most}, more than its --memory-limit of {limit}; give it more, or leave this log out"
     return _cut("memory", task, -signal.SIGKILL, what, seconds, peak_bytes, attempt)
 

@@ -12,6 +12,7 @@ from pydantic import Strict, TypeAdapter, ValidationError
 
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location
+from mcap_landmarks.moments import time_ns
 
 _T = TypeVar("_T", "ManifestFile", "LoggedEntry")
 Moment = Annotated[datetime, Strict()] | str | Annotated[int, Strict()]
@@ -39,8 +40,21 @@ class ManifestFile:
     options: dict[str, OptionValue] = field(default_factory=dict)
 
 
-def read_fleet_manifest(file: Location) -> list[LoggedEntry]:
-    """The logs of a manifest, each with all its options: its own, then those of the file; `start` and `end` among them.
+@dataclass(frozen=True, slots=True)
+class ListedLog:
+    """A log of a manifest with all its options, `start` and `end` among them: its own, then those of the file.
+
+    `where` names the file and the table, `origins` the file, table and key of each option.
+    """
+
+    entry: LoggedEntry
+    where: str
+    options: dict[str, OptionValue]
+    origins: dict[str, str]
+
+
+def read_fleet_manifest(file: Location) -> list[ListedLog]:
+    """The logs of a manifest.
 
     Raises:
         UsageError: the file is none, or a table, key or value of it is none of a manifest.
@@ -59,10 +73,13 @@ def read_fleet_manifest(file: Location) -> list[LoggedEntry]:
         entry = _checked(LoggedEntry, table, where, 'path is missing; name the log, such as path = "monday.mcap"')
         if entry.name is not None and ("/" in entry.name or entry.name in {"", ".", ".."}):
             raise UsageError(f"{where}: name = {entry.name!r}: give the output's name without folders and suffix")
-        times = {
-            key: _written(value) for key, value in (("start", entry.start), ("end", entry.end)) if value is not None
+        times = {key: _written(value, f"{where}: {key}") for key, value in _times(entry) if value is not None}
+        origins = {
+            **{key: f"{file}: [options]: {key}" for key in whole.options},
+            **{key: f"{where}: {key}" for key in times},
+            **{key: f"{where}: options.{key}" for key in entry.options},
         }
-        entries.append(dataclasses.replace(entry, options={**whole.options, **times, **entry.options}))
+        entries.append(ListedLog(entry, where, {**whole.options, **times, **entry.options}, origins))
     return entries
 
 
@@ -78,8 +95,15 @@ def words_of(options: Mapping[str, object]) -> tuple[str, ...]:
     return tuple(words)
 
 
-def _written(value: Moment) -> str:
-    return value.isoformat() if isinstance(value, datetime) else str(value)
+def _times(entry: LoggedEntry) -> tuple[tuple[str, Moment | None], ...]:
+    return ("start", entry.start), ("end", entry.end)
+
+
+def _written(value: Moment, where: str) -> str:
+    """A time as the command line has it, which is refused here if it is none."""
+    text = value.isoformat() if isinstance(value, datetime) else str(value)
+    time_ns(text, f"{where} =")
+    return text
 
 
 def _checked(declared: type[_T], table: Mapping[str, object], where: str, lacking: str) -> _T:

@@ -1,12 +1,13 @@
 """Which logs a fleet has, as names, patterns, prefixes and manifests give them, and where their results go."""
 
+import glob
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.errors import ToolkitError, UsageError
-from mcap_landmarks.fleet.fleet_manifest import read_fleet_manifest
+from mcap_landmarks.fleet.fleet_manifest import ListedLog, read_fleet_manifest
 from mcap_landmarks.inspection.open_logs import open_logs
 from mcap_landmarks.locations import Location, Url, address, is_there, location, matching, same_place
 
@@ -16,11 +17,15 @@ MANIFEST = ".toml"
 
 @dataclass(frozen=True, slots=True)
 class FleetLog:
-    """A log, the name of its output without suffix (None: its own), and what a manifest says of its options."""
+    """A log, the name of its output without suffix (None: its own), and what a manifest says of its options.
+
+    `origins` says of each option where the manifest has it: file, table and key.
+    """
 
     place: Location
     name: str | None = None
     options: Mapping[str, object] = field(default_factory=dict)
+    origins: Mapping[str, str] = field(default_factory=dict)
 
     def key(self) -> tuple[str, str | None, str]:
         """Equal for what is the same log with the same options and output."""
@@ -44,14 +49,31 @@ def find_logs(names: Iterable[str]) -> list[FleetLog]:
 
 
 def _of_manifest(file: Location) -> list[FleetLog]:
-    """The logs of a manifest; paths in it are meant from its folder."""
-    logs = []
-    for entry in read_fleet_manifest(file):
-        place = location(entry.path)
-        if isinstance(place, Path):
-            place = file.parent / place if isinstance(file, Path) else file.with_name(entry.path)
-        logs.append(FleetLog(place, entry.name, entry.options))
-    return logs
+    """The logs of a manifest."""
+    return [
+        FleetLog(_place(file, listed), listed.entry.name, listed.options, listed.origins)
+        for listed in read_fleet_manifest(file)
+    ]
+
+
+def _place(file: Location, listed: ListedLog) -> Location:
+    """Where a log of a manifest is; paths in it are meant from its folder.
+
+    Raises:
+        UsageError: the path is a pattern, or of this machine and nothing is there.
+    """
+    path = listed.entry.path
+    place = location(path)
+    if isinstance(place, Path):
+        place = file.parent / place if isinstance(file, Path) else file.with_name(path)
+    is_local = isinstance(place, Path)
+    if is_local and is_there(place):
+        return place
+    if glob.has_magic(path) if is_local else "*" in path:  # a URL's query begins with a question mark
+        raise UsageError(f"{listed.where}: path = '{place}': patterns are for the command line; list each log")
+    if is_local:
+        raise UsageError(f"{listed.where}: path = '{place}': there is no such file; name it from the manifest's folder")
+    return place
 
 
 def outputs_in(folder: Location, logs: Sequence[FleetLog], suffix: str) -> list[tuple[FleetLog, Location]]:

@@ -9,7 +9,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
-from multiprocessing import connection
+from multiprocessing import connection, resource_tracker
 from queue import Empty, SimpleQueue
 
 import psutil
@@ -97,6 +97,7 @@ class _Worker:
     def _start(self) -> ProcessPool:
         """Start a process that takes no Ctrl-C: the terminal sends that to all, and it is for us to end the others."""
         pool = self._pool = ProcessPool(1, initializer=_begin, context=multiprocessing.get_context("spawn"))
+        resource_tracker.ensure_running()  # else the first process starts it, which lets SIGINT through again
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self._tell(pool.schedule(os.getpid))

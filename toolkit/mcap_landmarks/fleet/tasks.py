@@ -36,10 +36,11 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class TaskLimits:
-    """What one task may take; None: no limit."""
+    """What one task may take; None: no limit. `memory_text` is the size as the user wrote it."""
 
     seconds: float | None = None
     memory_bytes: int | None = None
+    memory_text: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
