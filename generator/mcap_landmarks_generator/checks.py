@@ -47,9 +47,11 @@ def stage(loaded: LoadedScenario) -> Staged:
             object, a waypoint that the robot cannot reach straight from the one before; the message names the line.
     """
     scenario = loaded.scenario
-    warnings: list[str] = []
+    warnings: tuple[str, ...] = ()
+    models: tuple[str, ...] = ()
     if scenario.world is not None:
-        objects, warnings = objects_of(read_world(Path(scenario.world.file)), scenario.world.classes)
+        objects, models, warnings = objects_of(read_world(Path(scenario.world.file)), scenario.world.classes)
+        loaded = loaded.with_world(scenario.world.file, len(objects))
         scenario = replace(scenario, objects=objects, groups=None, world=None)
     _check_variants(loaded, scenario)
     if scenario.groups is not None:
@@ -63,8 +65,8 @@ def stage(loaded: LoadedScenario) -> Staged:
             trajectory=replace(scenario.trajectory, waypoints=way),
         )
     placed = place(scenario.objects)
-    _check_objects(loaded, placed)
-    staged = Staged(loaded.name, scenario, placed, start_pose(scenario), tuple(warnings))
+    _check_objects(loaded, placed, models)
+    staged = Staged(loaded.name, scenario, placed, start_pose(scenario), warnings)
     _check_way(loaded, staged)
     return staged
 
@@ -92,27 +94,29 @@ def _check_variants(loaded: LoadedScenario, scenario: Scenario) -> None:
             raise loaded.fault(("objects", i, "variant"), str(error)) from error
 
 
-def _check_objects(loaded: LoadedScenario, placed: Sequence[PlacedObject]) -> None:
+def _check_objects(loaded: LoadedScenario, placed: Sequence[PlacedObject], models: Sequence[str]) -> None:
+    """Refuse objects inside each other, or that walk into others; of a world's `models` these are named, too."""
+    names = [one.object_id for one in placed]
+    if models:
+        names = [f"{name} (model {model})" for name, model in zip(names, models, strict=True)]
     centres = np.array([one.route_xy[0] for one in placed]).reshape(-1, 2)
     reaches = np.array([one.asset.footprint_radius_m for one in placed])
     for i, second in enumerate(placed):
         away = np.hypot(*(centres[:i] - centres[i]).T)
         for k in np.flatnonzero(away < reaches[:i] + reaches[i]).tolist():
             if footprints.overlap(placed[k], second):
-                raise loaded.fault(
-                    ("objects", i), f"{second.object_id} stands inside {placed[k].object_id}; move one of them"
-                )
+                raise loaded.fault(("objects", i), f"{names[i]} stands inside {names[k]}; move one of them")
         if second.moves:
-            _check_walk(loaded, i, placed)
+            _check_walk(loaded, i, placed, names)
 
 
-def _check_walk(loaded: LoadedScenario, i: int, placed: Sequence[PlacedObject]) -> None:
+def _check_walk(loaded: LoadedScenario, i: int, placed: Sequence[PlacedObject], names: Sequence[str]) -> None:
     walker = placed[i]
     for k, (start, end) in enumerate(pairwise([*walker.route_xy, walker.route_xy[0]])):
         blocking = _blocking(start, end, placed, WALKER_RADIUS_M)
         if blocking is not None:
             place = min(k, len(walker.route_xy) - 2)
-            problem = f"{walker.object_id} would walk into {blocking.object_id}; move one of them"
+            problem = f"{names[i]} would walk into {names[placed.index(blocking)]}; move one of them"
             raise loaded.fault(("objects", i, "walk", place), problem)
 
 

@@ -5,12 +5,13 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from mcap_landmarks.errors import ToolkitError, UsageError
 from pydantic import ValidationError
 
 from mcap_landmarks_generator.bundled import FOLDER, bundled
-from mcap_landmarks_generator.scenario import ADAPTER, Scenario
+from mcap_landmarks_generator.scenario import ADAPTER, Scenario, json_schema
 from mcap_landmarks_generator.toml_lines import KeyPath, lines_of
 
 
@@ -25,6 +26,11 @@ class LoadedScenario:
     def fault(self, key_path: KeyPath, problem: str) -> ToolkitError:
         """The error that says where the value at `key_path` was written and what is wrong with it."""
         return ToolkitError(f"{_origin(self.origins, self.name, key_path)}: {problem}")
+
+    def with_world(self, file: str, count: int) -> "LoadedScenario":
+        """The scenario whose objects are the first `count` that the file of a world has, not those written in TOML."""
+        kept = {key_path: origin for key_path, origin in self.origins.items() if key_path[0] != "objects"}
+        return replace(self, origins={**kept, **{("objects", i): file for i in range(count)}})
 
 
 def load_scenario(name: str, settings: Sequence[str] = (), seed: int | None = None) -> LoadedScenario:
@@ -125,7 +131,10 @@ def _first_fault(error: ValidationError, origins: Mapping[KeyPath, str], path: P
     first = error.errors(include_url=False)[0]
     key_path: KeyPath = tuple(first["loc"])
     if first["type"] == "unexpected_keyword_argument":
-        problem = f"unknown key {key_path[-1]}"
+        known = _keys_of(key_path[:-1])
+        near = difflib.get_close_matches(str(key_path[-1]), known, n=1)
+        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(known)}"
+        problem = f"unknown key {key_path[-1]}; {hint}"
     elif first["type"] == "missing":
         problem = f"the key {key_path[-1]} is missing"
     else:
@@ -133,6 +142,18 @@ def _first_fault(error: ValidationError, origins: Mapping[KeyPath, str], path: P
         problem = f"{'.'.join(str(part) for part in key_path)} = {first['input']!r}: {message}"
     origin = _origin(origins, str(path), key_path)
     return UsageError(f"{origin}: {problem}") if origin.startswith("--set") else ToolkitError(f"{origin}: {problem}")
+
+
+def _keys_of(table: KeyPath) -> list[str]:
+    """The keys that a table of a scenario can have, as its JSON schema lists them."""
+    root: dict[str, Any] = json_schema()
+    node = root
+    for part in table:
+        node = node["items"] if isinstance(part, int) else node["properties"][part]
+        node = next((one for one in node.get("anyOf", ()) if "$ref" in one), node)  # one that may be left out
+        if "$ref" in node:
+            node = root["$defs"][node["$ref"].rpartition("/")[2]]
+    return sorted(node["properties"])
 
 
 def _origin(origins: Mapping[KeyPath, str], default: str, key_path: KeyPath) -> str:

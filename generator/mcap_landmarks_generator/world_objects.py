@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,14 +25,22 @@ _SPEED_MPS = 1.2
 """Of one who walks in no time, as a script without times has it."""
 
 
-def objects_of(models: Sequence[SdfModel], classes: Mapping[str, str]) -> tuple[tuple[ObjectSpec, ...], list[str]]:
-    """The objects that models become, and warnings of what is not as in the world.
+class WorldObjects(NamedTuple):
+    """The objects that models become, the name of each one's model, and warnings of what is not as in the world."""
+
+    objects: tuple[ObjectSpec, ...]
+    models: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def objects_of(models: Sequence[SdfModel], classes: Mapping[str, str]) -> WorldObjects:
+    """The objects that models become.
 
     `classes` are classes or distractors by pattern of names (`*` is any text); an empty one leaves the model out. Where
     no pattern fits, words of the name decide. What is of no class stands as a distractor of about its shape, unless it
     would stand inside another object.
     """
-    objects: list[ObjectSpec] = []
+    objects: list[tuple[str, ObjectSpec]] = []
     stand_ins: list[tuple[str, ObjectSpec]] = []
     for number, model in enumerate(models):
         found = _class_of(model, classes)
@@ -39,10 +48,10 @@ def objects_of(models: Sequence[SdfModel], classes: Mapping[str, str]) -> tuple[
             continue
         spec = _spec(model, found or _by_shape(model), look=number)
         if found:
-            objects.append(spec)
+            objects.append((model.name, spec))
         else:
             stand_ins.append((model.name, spec))
-    kept, inside = _apart(objects, stand_ins)
+    kept, inside = _apart([spec for _, spec in objects], stand_ins)
     warnings = []
     if stand_ins:
         warnings.append(
@@ -51,7 +60,8 @@ def objects_of(models: Sequence[SdfModel], classes: Mapping[str, str]) -> tuple[
         )
     if inside:
         warnings.append(f"{_named(inside)}: left out, since what stands for them would be inside another object")
-    return (*objects, *kept), warnings
+    found = [*objects, *kept]
+    return WorldObjects(tuple(spec for _, spec in found), tuple(name for name, _ in found), tuple(warnings))
 
 
 def _class_of(model: SdfModel, classes: Mapping[str, str]) -> str | None:
@@ -102,17 +112,17 @@ def _spec(model: SdfModel, class_name: str, look: int) -> ObjectSpec:
 
 def _apart(
     objects: Sequence[ObjectSpec], stand_ins: Sequence[tuple[str, ObjectSpec]]
-) -> tuple[list[ObjectSpec], list[str]]:
+) -> tuple[list[tuple[str, ObjectSpec]], list[str]]:
     """The stand-ins that are not inside an object or one another, and the names of the others."""
     standing = list(place(tuple(objects)))
-    kept, inside = [], []
+    kept, inside = list[tuple[str, ObjectSpec]](), list[str]()
     for name, spec in stand_ins:
         (placed,) = place((spec,))
         if any(footprints.overlap(placed, other) for other in standing):
             inside.append(name)
         else:
             standing.append(placed)
-            kept.append(spec)
+            kept.append((name, spec))
     return kept, inside
 
 

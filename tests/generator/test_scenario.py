@@ -51,7 +51,15 @@ def refused(tmp_path: Path, text: str) -> str:
         ),
         ("at = [1.0, 2.0],", "at = [5.0, 2.1],", "bad.toml:13: waypoint 1 at (5, 2.1) cannot be reached: suitcase_1"),
         ("rate_hz = 5", "rate_hz = -5", "bad.toml:9: camera.rate_hz = -5: should be greater than 0"),
-        ("rate_hz = 5", "rat_hz = 5", "bad.toml:9: unknown key rat_hz"),
+        ("rate_hz = 5", "rat_hz = 5", "bad.toml:9: unknown key rat_hz; did you mean rate_hz?"),
+        (
+            "[camera]",
+            "[light]\nwarmth = 3\n[camera]",
+            "bad.toml:9: unknown key warmth; there are ambient, azimuth_deg, diffuse",
+        ),
+        ("at = [5.0, 2.0]", "at = [5.0, 2.0], yaw = 3", "bad.toml:4: unknown key yaw; did you mean"),
+        ("[camera]", "[ring_lidar]\nring = 16\n[camera]", "bad.toml:9: unknown key ring; did you mean rings?"),
+        ("seed = 4", "sede = 4", "bad.toml:1: unknown key sede; did you mean seed?"),
         ("rate_hz = 5", 'when = "often"', "bad.toml:9: camera.when = 'often': should be 'always', 'stops' or 'never'"),
         (
             "start = [0.0, 0.0, 0.0]",

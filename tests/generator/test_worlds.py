@@ -87,6 +87,28 @@ def test_the_world_stands_in_for_the_objects_of_a_scenario() -> None:
     assert staged.warnings == ()
 
 
+CRATE = "<include><name>{}</name><uri>model://crate</uri><pose>{} 5 0 0 0 0</pose></include>"
+
+
+@pytest.mark.parametrize(
+    ("models", "words"),
+    [
+        (CRATE.format("a", 5) + CRATE.format("b", 5.1), "box_2 (model b) stands inside box_1 (model a)"),
+        (
+            CRATE.format("a", 5) + '<actor name="visitor"><script><trajectory id="0" type="walk">'
+            "<waypoint><time>0</time><pose>5 8 0 0 0 0</pose></waypoint>"
+            "<waypoint><time>4</time><pose>5 2 0 0 0 0</pose></waypoint></trajectory></script></actor>",
+            "person_1 (model visitor) would walk into box_1 (model a)",
+        ),
+    ],
+)
+def test_what_is_wrong_with_its_objects_names_the_world_and_its_models(tmp_path: Path, models: str, words: str) -> None:
+    path = world(tmp_path, models)
+    with pytest.raises(ToolkitError) as caught:
+        stage(load_scenario("small", [f"world.file={path}"]))
+    assert str(caught.value) == f"{path}: {words}; move one of them"
+
+
 CONE = "<include><uri>model://cone</uri>{}</include>"
 RING = '<frame name="a"><pose relative_to="b"/></frame><frame name="b"><pose relative_to="a"/></frame>'
 CHAIN = "".join(f'<frame name="f{i}"><pose relative_to="f{i + 1}"/></frame>' for i in range(3000))

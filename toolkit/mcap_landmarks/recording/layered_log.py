@@ -97,6 +97,15 @@ class LayeredLog:
         """What could not be read so far."""
         return list(dict.fromkeys(loss for layer in self.layers for loss in layer.recording.losses))
 
+    def told_damage(self) -> str:
+        """Why something may be missing in it, and what to do; empty where all could be read so far."""
+        if not self.losses:
+            return ""
+        return (
+            f"not all of the file could be read ({self.losses[0]}), so copy it again, or save what is sound: "
+            f"mcap-landmarks recover {self.path} -o OUT.mcap"
+        )
+
     def times_ns(self) -> tuple[int | None, int | None]:
         """The first and the last log time of all layers' recordings, None where they hold no messages."""
         firsts = [layer.recording.start_ns for layer in self.layers if layer.recording.start_ns is not None]

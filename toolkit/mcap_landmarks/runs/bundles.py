@@ -29,6 +29,7 @@ from mcap_landmarks.messages.spatial_objects import seen_from_above
 from mcap_landmarks.messages.transforms import TFMessage
 from mcap_landmarks.messages.velocities import SceneVelocities
 from mcap_landmarks.moments import moment
+from mcap_landmarks.recording.layered_log import LayeredLog
 from mcap_landmarks.recording.odometry_track import OdometryTrack
 from mcap_landmarks.recording.time_association import Association, associate
 from mcap_landmarks.stage import Bundle, Channel, Connection, RawMessage, Readable
@@ -103,7 +104,7 @@ class Reading:
 
 
 def inputs_of(
-    recording: Readable, reads: Iterable[Channel[Message]], required: Iterable[Channel[Message]], choice: Choice
+    recording: LayeredLog, reads: Iterable[Channel[Message]], required: Iterable[Channel[Message]], choice: Choice
 ) -> dict[Connection, Channel[Message]]:
     """The connections that a stage reads, each with the channel it stands for.
 
@@ -124,20 +125,19 @@ def inputs_of(
     return found
 
 
-def _missing(recording: Readable, channel: Channel[Message], empty: bool) -> str:
-    role = ROLES.get(channel)
+def _missing(recording: LayeredLog, channel: Channel[Message], empty: bool) -> str:
+    role, damage = ROLES.get(channel), recording.told_damage()
     if empty:
         name = role.name if role else channel.topic
-        return f"{recording.path}: the {name} topic has no messages; record it, or choose another log"
+        return f"{recording.path}: the {name} topic has no messages; {damage or 'record it, or choose another log'}"
     if role is None:
-        return (
-            f"{recording.path}: there is no {channel.topic}; run the stage that writes it first, or read another topic "
-            f"as it with --remap TOPIC={channel.topic}"
-        )
+        remedy = f"run the stage that writes it first, or read another topic as it with --remap TOPIC={channel.topic}"
+        return f"{recording.path}: there is no {channel.topic}; {damage or remedy}"
     types = " or ".join(role.types)
     present = [(entry.connection.topic, entry.connection.message_type) for entry in recording.channels]
     remedy = f"choose a topic with {role.option}, or take a log that has one, such as {channel.topic}"
-    told = told_formats(recording.channels) or could_be(present, channel) or remedy
+    hint = told_formats(recording.channels) or could_be(present, channel)
+    told = "; ".join(filter(None, (hint, damage))) or remedy
     return f"{recording.path}: there is no {role.name} ({types}); {told}"
 
 

@@ -71,9 +71,10 @@ class _LackingError(RecordingError):
         present = [(entry.connection.topic, entry.connection.message_type) for entry in own.channels]
         hints = [hint for source in sources if (hint := could_be(present, source))]
         formats = told_formats(own.channels)
+        told = filter(None, (formats or "; ".join(hints), own.told_damage()))
         super().__init__(
             f"{log.path}: there is no {_name(channel)}, and no {' or '.join(map(_name, sources))} to make it from; "
-            f"{formats or '; '.join(hints) or remedy}"
+            f"{'; '.join(told) or remedy}"
         )
         self.sources = sources
 
