@@ -60,8 +60,8 @@ def objects_of(models: Sequence[SdfModel], classes: Mapping[str, str]) -> WorldO
         )
     if inside:
         warnings.append(f"{_named(inside)}: left out, since what stands for them would be inside another object")
-    found = [*objects, *kept]
-    return WorldObjects(tuple(spec for _, spec in found), tuple(name for name, _ in found), tuple(warnings))
+    all_ = [*objects, *kept]
+    return WorldObjects(tuple(spec for _, spec in all_), tuple(name for name, _ in all_), tuple(warnings))
 
 
 def _class_of(model: SdfModel, classes: Mapping[str, str]) -> str | None:

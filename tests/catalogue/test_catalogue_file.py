@@ -68,12 +68,12 @@ def test_what_is_no_catalogue_is_refused_and_stays(tmp_path: Path) -> None:
         place = tmp_path / name
         make(place)
         before = place.read_bytes()
-        with pytest.raises(RecordingError, match=reason):
+        with pytest.raises(UsageError, match=reason):
             check_catalogue(place)
         with pytest.raises(RecordingError, match=reason):
             append_rows(place, [row("a.mcap", None)])
         assert place.read_bytes() == before
-        assert is_catalogue(place) is (name == "a.parquet")  # reading it says what is wrong
+        assert is_catalogue(place) is (name != "c.db")  # reading it says what is wrong
     with pytest.raises(UsageError, match=r"runs.csv: a catalogue is named .parquet, .db, .sqlite"):
         check_catalogue(tmp_path / "runs.csv")
     assert read_manifest(MAP_DB)
@@ -86,7 +86,7 @@ def test_a_column_of_another_type_is_told(tmp_path: Path) -> None:
         database.execute("ALTER TABLE runs DROP COLUMN rmse_m")
         database.execute("ALTER TABLE runs ADD COLUMN rmse_m TEXT")
         database.commit()
-    with pytest.raises(RecordingError, match="column rmse_m is of another type"):
+    with pytest.raises(UsageError, match="column rmse_m is of another type"):
         check_catalogue(place)
 
 

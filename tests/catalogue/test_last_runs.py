@@ -1,5 +1,7 @@
 """The last run of each log in a catalogue: where its output lies now, or why there is none."""
 
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -41,6 +43,40 @@ def test_figures_alone_are_no_results(tmp_path: Path) -> None:
     append_rows(tmp_path / "runs.db", [row("a.mcap", "a.json", verb="evaluate")])
     with pytest.raises(RecordingError, match="has no run that made results"):
         last_runs(tmp_path / "runs.db")
+
+
+@pytest.mark.parametrize("name", ["runs.parquet", "runs.db"])
+def test_what_is_not_there_is_told_from_what_is_empty(name: str, tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match=f"{name}: there is no such file; check the path"):
+        last_runs(tmp_path / name)
+
+
+def test_what_is_neither_a_map_nor_a_catalogue_is_told_so(tmp_path: Path) -> None:
+    place = tmp_path / "runs.db"
+    neither = f"{place}: is neither a landmark database nor a catalogue"
+    place.write_text("<!doctype html>")
+    with pytest.raises(RecordingError) as caught:
+        last_runs(place)
+    assert str(caught.value) == f"{neither} (it is no SQLite database); name one that map or batch --catalogue wrote"
+    for columns, reason in (
+        ("log TEXT, output TEXT, verb TEXT, started TIMESTAMP", "as it has no column outcome"),
+        ("log INTEGER, output TEXT, verb TEXT, outcome TEXT, started TIMESTAMP", "as its column log is of another"),
+    ):
+        place.unlink()
+        with closing(sqlite3.connect(place)) as database:
+            database.execute(f"CREATE TABLE runs ({columns})")
+        with pytest.raises(RecordingError, match=f"{neither}, {reason}"):
+            last_runs(place)
+
+
+def test_a_selection_that_sqlite_made_is_a_catalogue_still(tmp_path: Path) -> None:
+    place = tmp_path / "runs.db"
+    append_rows(place, [row("a.mcap", "a.mcap", bundles=3)])
+    with closing(sqlite3.connect(place)) as database:
+        database.execute("ALTER TABLE runs RENAME TO every")
+        database.execute("CREATE TABLE runs AS SELECT log, output, verb, outcome, started, bundles FROM every")
+        database.commit()
+    assert [run.log for run in last_runs(place)] == ["a.mcap"]
 
 
 def test_relative_paths_are_as_seen_from_the_catalogue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -78,6 +78,13 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
         read_map(path)
 
 
+def test_a_recording_is_told_from_a_damaged_map(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    path.write_bytes(b"\x89MCAP0\r\n" + bytes(200))
+    with pytest.raises(MapError, match="is a recording and no landmark database; `map` makes one of it"):
+        read_map(path)
+
+
 def change(path: Path, statement: str) -> None:
     with sqlite3.connect(path) as database:
         database.execute(statement)

@@ -168,6 +168,14 @@ def test_a_host_that_is_not_there_is_named() -> None:
         location("http://127.0.0.1:9/a.mcap").open("rb")
 
 
+@pytest.mark.parametrize("gives_parts", [True, False])
+def test_a_web_page_is_no_recording(served: Served, gives_parts: bool) -> None:
+    served.gives_parts = gives_parts
+    served.files["index"] = b"\n<!DOCTYPE html><html><body>Sign in</body></html>"
+    with pytest.raises(RemoteError, match=r"/index: is a web page, not a recording; give the URL of the file itself"):
+        location(served.url("index")).open("rb")
+
+
 def test_a_server_without_parts_gives_the_whole_file_once(served: Served, url: Location, local: Path) -> None:
     served.gives_parts = False
     notes: list[str] = []

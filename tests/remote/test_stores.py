@@ -73,6 +73,8 @@ def test_what_is_not_there_is_named(bucket: Bucket) -> None:
         (bucket.url("no.mcap"), "there is no such file; check the URL"),
         (bucket.url("folder"), "it is a folder; name a file in it"),
         ("s3://no-such-bucket-at-all/a.mcap", "there is no such bucket; check its name"),
+        (f"s3://{bucket.name}", "names a bucket, not a file; name a file, as s3://BUCKET/NAME"),
+        ("s3://", "names neither a bucket nor a file; name a file, as s3://BUCKET/NAME"),
         ("memory://no/a.mcap", "there is no such file; check the URL"),
     ):
         with pytest.raises(RemoteError) as error:
@@ -106,7 +108,7 @@ def test_without_credentials_it_says_which_are_looked_for(
 def test_a_store_that_is_not_there_is_named(bucket: Bucket, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(refusals, "PAUSES_S", (0.0,))
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
-    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
+    monkeypatch.delenv("AWS_MAX_ATTEMPTS", raising=False)  # the tries are ours, none of them botocore's
     with pytest.raises(RemoteError, match=rf"^s3://{bucket.name}/a: the host cannot be reached \(2 tries\); "):
         location(bucket.url("a")).open("rb")
 
@@ -134,9 +136,10 @@ def test_prefixes_and_patterns_name_files_by_name(bucket: Bucket) -> None:
     assert found("day/a.mcap") == ["day/a.mcap"]
     assert is_folder(location(bucket.url("day")))
     assert not is_folder(location(bucket.url("day/a.mcap")))
-    for name in ("dawn", "day/*.bag"):
-        with pytest.raises(RemoteError, match="there is no such file, and none below it; check the URL"):
-            found(name)
+    with pytest.raises(RemoteError, match="there is no such file, and none below it; check the URL"):
+        found("dawn")
+    with pytest.raises(UsageError, match=r"\*\.bag: no file matches; quote the pattern and check the folder"):
+        found("day/*.bag")
 
 
 def test_a_web_server_lists_nothing() -> None:

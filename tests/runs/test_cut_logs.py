@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from tests.cli.calls import call
 from tests.cli.logs import messages, write
 

@@ -12,6 +12,8 @@ from mcap_landmarks.catalogue.sqlite_file import from_sqlite, to_sqlite
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.locations import Location, is_there
 
+_MAP_AT, _MAP = 68, b"MCLM"
+"""Where an SQLite file has its application id, and that of landmark databases; see `maps.database`."""
 _PATIENCE_S = 60.0
 """A catalogue of a million rows is written in less; who holds it for longer hangs."""
 
@@ -25,15 +27,29 @@ _PARQUET, _SQLITE = _Format(from_parquet, to_parquet), _Format(from_sqlite, to_s
 _FORMATS = {".parquet": _PARQUET, ".db": _SQLITE, ".sqlite": _SQLITE}
 
 
+class NoCatalogueError(RecordingError):
+    """A file is no catalogue, for a `reason` that reads on from that."""
+
+    def __init__(self, place: Location, reason: str) -> None:
+        super().__init__(f"{place}: is no catalogue{reason}; name one that batch --catalogue wrote")
+        self.reason = reason
+
+
 def is_catalogue(place: Location) -> bool:
-    """Whether a file is a catalogue: by its suffix, and by its table where that is one of landmark databases, too."""
-    if place.suffix.lower() not in _FORMATS:
-        return False
-    if place.suffix.lower() == ".parquet":
-        return True
-    with contextlib.suppress(RecordingError):
-        return bool(read_catalogue(place).columns)
-    return False
+    """Whether a file is to be read as a catalogue: by its suffix, unless it is or should be a landmark database.
+
+    What is neither counts as one: reading it says what is wrong.
+    """
+    suffix = place.suffix.lower()
+    if suffix not in _FORMATS or suffix == ".parquet":
+        return suffix in _FORMATS
+    if not is_there(place):
+        return suffix != ".db"
+    try:
+        with place.open("rb") as stream:
+            return stream.read(_MAP_AT + len(_MAP))[_MAP_AT:] != _MAP
+    except OSError:
+        return False  # opening it says what is wrong
 
 
 def read_catalogue(place: Location) -> Catalogue:
@@ -41,7 +57,8 @@ def read_catalogue(place: Location) -> Catalogue:
 
     Raises:
         UsageError: its name says no format, or it needs pyarrow.
-        RecordingError: it cannot be read, or is no catalogue.
+        RecordingError: it cannot be read.
+        NoCatalogueError: it is none.
     """
     format_ = _format_of(place)
     if not is_there(place):
@@ -54,10 +71,13 @@ def read_catalogue(place: Location) -> Catalogue:
     try:
         table = format_.read(content)
     except (ValueError, OSError) as error:  # the latter is pyarrow's, too
-        raise RecordingError(f"{place}: is no catalogue ({error}); name one that batch --catalogue wrote") from error
+        raise NoCatalogueError(place, f" ({error})") from error
     lacking = [name for name in NEEDED if name not in table.columns]
     if lacking:
-        raise RecordingError(f"{place}: is no catalogue, as it has no column {lacking[0]}; name one of a batch")
+        raise NoCatalogueError(place, f", as it has no column {lacking[0]}")
+    wrong = [name for name in NEEDED if table.columns[name] != COLUMNS[name]]
+    if wrong:
+        raise NoCatalogueError(place, f", as its column {wrong[0]} is of another type")
     return table
 
 
@@ -65,12 +85,15 @@ def check_catalogue(place: Location) -> None:
     """Refuse what no rows can be appended to, before anything runs.
 
     Raises:
-        UsageError: its name says no format, it cannot be written, or it needs pyarrow.
-        RecordingError: what is there is no catalogue.
+        UsageError: its name says no format, it cannot be written, what is there is no catalogue, or it needs pyarrow.
+        RecordingError: what is there cannot be read.
     """
     _format_of(place)
     check_target(place)
-    _check_kinds(place, read_catalogue(place))
+    try:
+        _check_kinds(place, read_catalogue(place))
+    except NoCatalogueError as error:
+        raise UsageError(str(error)) from error
 
 
 def append_rows(place: Location, rows: Iterable[Row]) -> None:
@@ -117,4 +140,4 @@ def _format_of(place: Location) -> _Format:
 def _check_kinds(place: Location, table: Catalogue) -> None:
     for name, kind in table.columns.items():
         if COLUMNS.get(name, kind) != kind:
-            raise RecordingError(f"{place}: its column {name} is of another type; name another file")
+            raise NoCatalogueError(place, f", as its column {name} is of another type")

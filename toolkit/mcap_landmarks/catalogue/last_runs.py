@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 
 from mcap_landmarks.catalogue.catalogue_columns import Row
-from mcap_landmarks.catalogue.catalogue_file import read_catalogue
+from mcap_landmarks.catalogue.catalogue_file import NoCatalogueError, read_catalogue
 from mcap_landmarks.errors import RecordingError
 from mcap_landmarks.locations import Location, is_there, location
 
@@ -32,9 +32,19 @@ def last_runs(place: Location) -> list[LastRun]:
     A name is the output's path from the folder that holds all outputs, without suffix.
 
     Raises:
-        UsageError, RecordingError: the catalogue cannot be read, or has no such run.
+        UsageError, RecordingError: there is no such catalogue, it cannot be read, or it has no such run.
     """
-    rows = [row for row in read_catalogue(place).rows if row["verb"] not in _WITHOUT_RESULTS]
+    if not is_there(place):
+        raise RecordingError(f"{place}: there is no such file; check the path")
+    try:
+        rows = [row for row in read_catalogue(place).rows if row["verb"] not in _WITHOUT_RESULTS]
+    except NoCatalogueError as error:
+        if place.suffix.lower() == ".parquet":
+            raise
+        raise RecordingError(
+            f"{place}: is neither a landmark database nor a catalogue{error.reason}; name one that map or "
+            "batch --catalogue wrote"
+        ) from error
     if not rows:
         raise RecordingError(
             f"{place}: has no run that made results; name a catalogue of localize, map or other stages"

@@ -4,10 +4,12 @@ import contextlib
 import sqlite3
 from datetime import UTC, datetime
 
-from mcap_landmarks.catalogue.catalogue_columns import Catalogue, Kind, Value
+from mcap_landmarks.catalogue.catalogue_columns import COLUMNS, Catalogue, Kind, Value
 
 _MAGIC = b"SQLite format 3\0"
 _TYPES: dict[Kind, str] = {"text": "TEXT", "integer": "INTEGER", "number": "REAL", "time": "TIMESTAMP"}
+_SELECTED: dict[str, Kind] = {"INT": "integer"}
+"""What SQLite calls a type in a table that it made of a selection, where that is another name; times it forgets."""
 
 
 def from_sqlite(content: bytes) -> Catalogue:
@@ -25,8 +27,8 @@ def from_sqlite(content: bytes) -> Catalogue:
             rows = database.execute("SELECT * FROM runs").fetchall()
     except sqlite3.Error as error:
         raise ValueError(str(error)) from error
-    kinds = {text: kind for kind, text in _TYPES.items()}
-    columns: dict[str, Kind] = {name: kinds.get(text.upper(), "text") for name, text in declared.items()}
+    kinds = {**{text: kind for kind, text in _TYPES.items()}, **_SELECTED}
+    columns = {name: kinds.get(text.upper(), COLUMNS.get(name, "text")) for name, text in declared.items()}
     read = [{name: _read(columns[name], value) for name, value in zip(columns, row, strict=True)} for row in rows]
     return Catalogue(columns, read)
 

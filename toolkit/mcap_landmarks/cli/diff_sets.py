@@ -50,7 +50,7 @@ def diff_folders(
     """
     from mcap_landmarks.diff.conditions import parse
     from mcap_landmarks.diff.criteria import read_criteria
-    from mcap_landmarks.diff.set_logs import is_set, set_size
+    from mcap_landmarks.diff.set_logs import check_sets, set_size
     from mcap_landmarks.diff.sets import diff_sets
     from mcap_landmarks.runs.replacing import new_files
 
@@ -59,9 +59,7 @@ def diff_folders(
             raise UsageError("--bless: where to? name CANDIDATE alone, and a folder with --baseline DIR")
         return _bless(candidate, baseline, reference, json=json)
     conditions = [parse(text) for text in fail_on]
-    for place in (baseline, candidate):
-        if not is_set(place):
-            raise UsageError(f"{place}: is no folder and no catalogue; compare two sets of logs, or two files")
+    check_sets(baseline, candidate)
     criteria = None if given.criteria is None else read_criteria(given.criteria)
     outputs, inputs = (given.junit, given.markdown), (baseline, candidate, given.criteria, reference)
     with new_files(outputs, inputs, overwrite=given.overwrite):

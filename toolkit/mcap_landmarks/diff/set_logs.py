@@ -35,6 +35,20 @@ def is_set(place: Location) -> bool:
     return is_catalogue(place) or is_folder(place)
 
 
+def check_sets(*places: Location) -> None:
+    """Refuse what is no set, where sets are compared.
+
+    Raises:
+        UsageError: one is none.
+        RecordingError: one that could be a catalogue is none: then the other need not be the wrong one.
+    """
+    wrong = [place for place in places if not is_set(place)]
+    if wrong:
+        for place in filter(is_catalogue, places):
+            last_runs(place)
+        raise UsageError(f"{wrong[0]}: is no folder and no catalogue; compare two sets of logs, or two files")
+
+
 def logs_in(folder: Location) -> list[SetLog]:
     """The logs of a folder by name, those in its folders too; where it has blessed results, these.
 

@@ -22,6 +22,8 @@ SCHEMA_VERSION = 1
 _NUMBERS = ("x_m", "y_m", "var_x_m2", "cov_xy_m2", "var_y_m2", "radius_m")
 _COLUMNS = [("number", "i8"), ("id", "O"), ("class", "O"), *((name, "f8") for name in _NUMBERS)]
 _COLUMNS += [("sightings", "i8"), ("tentative", "?")]
+_RECORDING = b"\x89MCAP0\r\n"
+"""What MCAP files begin with (mcap.dev/spec)."""
 _UPPER = np.triu_indices(3)
 # Arrays of landmarks that are kept to load the index of a map with so many landmarks in less time.
 _KEPT = {"triangles": 3, "pairs": 2}
@@ -41,6 +43,9 @@ def read_map(path: Location) -> LandmarkMap:
             _check_version(path, database)
             return _read(path, database)
     except (sqlite3.Error, ValueError, TypeError, KeyError) as error:
+        with to_read(path).open("rb") as stream:
+            if stream.read(len(_RECORDING)) == _RECORDING:
+                raise MapError(f"{path}: is a recording and no landmark database; `map` makes one of it") from error
         raise MapError(f"{path}: is not a landmark database or is damaged ({error}); build it again") from error
 
 

@@ -17,7 +17,7 @@ def urls_matching(text: str) -> list[str]:
     Sorted by name. A web server lists nothing: there only the file itself can be meant.
 
     Raises:
-        UsageError: a pattern for a web server; or see `store`.
+        UsageError: a pattern that nothing fits, or one for a web server; or see `store`.
         RemoteError: there is nothing, or it cannot be listed.
     """
     if is_web(text):
@@ -34,6 +34,8 @@ def urls_matching(text: str) -> list[str]:
 
     found = persistently(text, list_it)
     files = sorted(name for name, entry in found.items() if entry.get("type") == "file" and not name.endswith("/"))
+    if not files and is_pattern:
+        raise UsageError(f"{shown(text)}: no file matches; quote the pattern and check the folder")
     if not files:
         raise RemoteError(f"{shown(text)}: there is no such file, and none below it; check the URL")
     return [beside(text, name) for name in files]

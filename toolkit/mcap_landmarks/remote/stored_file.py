@@ -46,6 +46,9 @@ def stored_file(text: str, is_closed: threading.Event) -> StoredFile:
         from mcap_landmarks.remote.web_file import WebFile  # noqa: PLC0415 # a library that other stores do without
 
         return persistently(text, lambda: WebFile(file_system, text), is_closed)
+    if scheme_of(text) == "s3" and "/" not in path.strip("/"):
+        what = "names a bucket, not a file" if path.strip("/") else "names neither a bucket nor a file"
+        raise RemoteError(f"{shown(text)}: {what}; name a file, as s3://BUCKET/NAME")
     kind = _PinnedFile if scheme_of(text) == "s3" else _CheckedFile
 
     def open_it() -> StoredFile:

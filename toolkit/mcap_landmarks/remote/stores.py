@@ -1,6 +1,7 @@
 """From a URL to the fsspec file system that reads and writes there, with credentials of the environment only."""
 
 import importlib
+import os
 from collections.abc import Iterable, Mapping
 from typing import IO, NamedTuple, Protocol
 
@@ -56,7 +57,7 @@ class _Library(NamedTuple):
     settings: Mapping[str, object] = {}
 
 
-_S3 = _Library("s3fs", "s3", {"config_kwargs": {"max_pool_connections": 64}})
+_S3 = _Library("s3fs", "s3")
 _AZURE = _Library("adlfs", "azure")
 _WEB = _Library("aiohttp", None, {"client_kwargs": {"trust_env": True}})  # proxies and .netrc
 _LIBRARIES = {
@@ -92,7 +93,7 @@ def store(text: str) -> tuple[FileSystem, str]:
     fsspec = importlib.import_module("fsspec.core")
     found: tuple[FileSystem, str]
     try:
-        found = fsspec.url_to_fs(text, use_listings_cache=False, **library.settings)
+        found = fsspec.url_to_fs(text, use_listings_cache=False, **library.settings, **_once(library))
     except Exception as error:
         raise refusal(text, error) from error
     return found
@@ -106,6 +107,14 @@ def is_web(text: str) -> bool:
 def schemes() -> Iterable[str]:
     """The schemes that can be read."""
     return _LIBRARIES.keys()
+
+
+def _once(library: _Library) -> Mapping[str, object]:
+    """Settings by which botocore leaves it to `refusals` to try again, unless the environment says how often."""
+    if library is not _S3:
+        return {}
+    once = {} if "AWS_MAX_ATTEMPTS" in os.environ else {"retries": {"total_max_attempts": 1}}
+    return {"config_kwargs": {"max_pool_connections": 64, **once}}
 
 
 def _library(text: str) -> _Library:

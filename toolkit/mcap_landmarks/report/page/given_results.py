@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from mcap_landmarks.catalogue.catalogue_file import is_catalogue
 from mcap_landmarks.catalogue.last_runs import last_runs
-from mcap_landmarks.errors import UsageError
+from mcap_landmarks.errors import RecordingError, RemoteError, UsageError
 from mcap_landmarks.locations import Location, address
 from mcap_landmarks.report.page.fleet_page import UnreadResult
 
@@ -28,11 +28,12 @@ def given_results(places: Sequence[Location], *, is_diff: bool) -> GivenResults:
 
     Raises:
         UsageError: --diff is of catalogues.
-        RecordingError: a catalogue cannot be read, or has no results.
+        RecordingError, RemoteError: the only one cannot be read, or has no results.
     """
     catalogues = [place for place in places if is_catalogue(place)]
     if is_diff:
         if catalogues:
+            last_runs(catalogues[0])  # which is wrong before it is of many
             raise UsageError(f"--diff is of two results, and {catalogues[0]} is of many; see mcap-landmarks diff")
         return GivenResults(tuple(places))
     files, missing = list[Location](), list[UnreadResult]()
@@ -40,7 +41,13 @@ def given_results(places: Sequence[Location], *, is_diff: bool) -> GivenResults:
         if place not in catalogues:
             files.append(place)
             continue
-        runs = last_runs(place)
+        try:
+            runs = last_runs(place)
+        except (RecordingError, RemoteError) as error:
+            if len(places) == 1:
+                raise
+            missing.append(UnreadResult(place.name, str(error)))
+            continue
         files += dict.fromkeys(run.output for run in runs if run.output is not None)  # logs of one map share it
         missing += [UnreadResult(run.name, run.error) for run in runs if run.error is not None]
     once, notes = _each_once(files)
