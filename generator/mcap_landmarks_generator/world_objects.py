@@ -3,6 +3,7 @@
 import re
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -51,7 +52,7 @@ def objects_of(models: Sequence[SdfModel], classes: Mapping[str, str]) -> WorldO
             objects.append((model.name, spec))
         else:
             stand_ins.append((model.name, spec))
-    kept, inside = _apart([spec for _, spec in objects], stand_ins)
+    kept, inside = _apart(objects, stand_ins)
     warnings = []
     if stand_ins:
         warnings.append(
@@ -61,7 +62,7 @@ def objects_of(models: Sequence[SdfModel], classes: Mapping[str, str]) -> WorldO
     if inside:
         warnings.append(f"{_named(inside)}: left out, since what stands for them would be inside another object")
     all_ = [*objects, *kept]
-    return WorldObjects(tuple(spec for _, spec in all_), tuple(name for name, _ in all_), tuple(warnings))
+    return WorldObjects(tuple(map(itemgetter(1), all_)), tuple(map(itemgetter(0), all_)), tuple(warnings))
 
 
 def _class_of(model: SdfModel, classes: Mapping[str, str]) -> str | None:
@@ -111,10 +112,10 @@ def _spec(model: SdfModel, class_name: str, look: int) -> ObjectSpec:
 
 
 def _apart(
-    objects: Sequence[ObjectSpec], stand_ins: Sequence[tuple[str, ObjectSpec]]
+    objects: Sequence[tuple[str, ObjectSpec]], stand_ins: Sequence[tuple[str, ObjectSpec]]
 ) -> tuple[list[tuple[str, ObjectSpec]], list[str]]:
     """The stand-ins that are not inside an object or one another, and the names of the others."""
-    standing = list(place(tuple(objects)))
+    standing = list(place(tuple(spec for _, spec in objects)))
     kept, inside = list[tuple[str, ObjectSpec]](), list[str]()
     for name, spec in stand_ins:
         (placed,) = place((spec,))

@@ -127,7 +127,7 @@ def test_what_cannot_be_written_is_told_before_anything_runs_or_at_the_end(
     words = ("batch", "convert", folder / "logs" / "a.mcap", "-o", tmp_path / "out", "--catalogue")
     assert "a catalogue is named" in refused(capsys, 2, *words, tmp_path / "runs.csv")
     assert "does not exist" in refused(capsys, 2, *words, tmp_path / "no" / "runs.db")
-    assert "is no catalogue" in refused(capsys, 1, *words, folder / "a.db")
+    assert "is no catalogue" in refused(capsys, 2, *words, folder / "a.db")
     assert not (tmp_path / "out").exists()
     monkeypatch.setattr(catalogue_file, "_PATIENCE_S", 0.0)
     with held(tmp_path / "runs.db"):

@@ -32,6 +32,7 @@ class _Answer(NamedTuple):
     content: bytes
     size: int
     version: str
+    content_type: str
 
 
 class WebFile:
@@ -42,6 +43,7 @@ class WebFile:
         self._text = text
         self._url = URL(text, encoded="%" in text)  # a signed URL stays as it was signed
         first = self._ask(0, BEGIN)
+        self._check_no_page(first.content_type, first.content[:_TELLING])
         self.size, self.version, self.begin = first.size, first.version, first.content
 
     def bytes_of(self, start: int, end: int) -> bytes:
@@ -57,14 +59,14 @@ class WebFile:
         answer: _Answer = sync(self._file_system.loop, self._answer, start, end)
         return answer
 
-    def _check_no_page(self, response: aiohttp.ClientResponse, begin: bytes) -> None:
+    def _check_no_page(self, content_type: str, begin: bytes) -> None:
         """Refuse what servers give for folders, logins and errors.
 
         Raises:
             RemoteError: it is a web page.
         """
         markup = begin.removeprefix(codecs.BOM_UTF8).lstrip().lower()
-        is_named_page = response.content_type == "text/html" and markup.startswith(b"<")
+        is_named_page = content_type == "text/html" and markup.startswith(b"<")
         if is_named_page or markup.startswith((b"<!doctype html", b"<html")):
             raise RemoteError(f"{shown(self._text)}: is a web page, not a recording; give the URL of the file itself")
 
@@ -74,17 +76,14 @@ class WebFile:
         async with session.get(self._url, headers=headers, timeout=_TIMEOUT) as response:
             place = _CONTENT_RANGE.fullmatch(response.headers.get("Content-Range", ""))
             version = response.headers.get("ETag") or response.headers.get("Last-Modified") or ""
-            if response.status == 200:
-                self._check_no_page(response, await response.content.read(_TELLING))
             if response.status == 200 or (response.status == 206 and place is None):
+                self._check_no_page(response.content_type, await response.content.read(_TELLING))
                 raise WholeOnlyError(version, response.content_length)
             if response.status == 416 and place is not None:  # nothing lies there: it is empty, or shorter than it was
-                return _Answer(b"", int(place[3]), version)
+                return _Answer(b"", int(place[3]), version, response.content_type)
             if response.status != 206 or place is None:
                 raise StatusError(response.status)
             content = await response.read()
             if place[1] is None or int(place[1]) != start:
                 raise DroppedError
-            if start == 0:
-                self._check_no_page(response, content[:_TELLING])
-            return _Answer(content, int(place[3]), version)
+            return _Answer(content, int(place[3]), version, response.content_type)

@@ -42,16 +42,22 @@ def given_results(places: Sequence[Location], *, is_diff: bool) -> GivenResults:
             files.append(place)
             continue
         try:
-            runs = last_runs(place)
+            outputs, gone = _catalogued(place)
         except (RecordingError, RemoteError) as error:
             if len(places) == 1:
                 raise
-            missing.append(UnreadResult(place.name, str(error)))
-            continue
-        files += dict.fromkeys(run.output for run in runs if run.output is not None)  # logs of one map share it
-        missing += [UnreadResult(run.name, run.error) for run in runs if run.error is not None]
+            outputs, gone = [], [UnreadResult(place.name, str(error))]
+        files += outputs
+        missing += gone
     once, notes = _each_once(files)
     return GivenResults(tuple(once), tuple(missing), tuple(notes), len(places) > 1 or bool(catalogues))
+
+
+def _catalogued(place: Location) -> tuple[list[Location], list[UnreadResult]]:
+    """The outputs of a catalogue, and those that are not there."""
+    runs = last_runs(place)
+    outputs = dict.fromkeys(run.output for run in runs if run.output is not None)  # logs of one map share it
+    return list(outputs), [UnreadResult(run.name, run.error) for run in runs if run.error is not None]
 
 
 def _each_once(files: Iterable[Location]) -> tuple[list[Location], list[str]]:
