@@ -27,10 +27,10 @@ def resolved(name: str) -> object:
     raise ModuleNotFoundError(name)
 
 
-def test_an_image_a_scan_and_a_setting_take_at_most_eight_hops() -> None:
-    assert [way.split("**")[0] for way in WAYS] == ["image", "scan", "setting"]
+def test_an_image_a_scan_a_fleet_and_a_setting_take_at_most_eight_hops() -> None:
+    assert [way.split("**")[0] for way in WAYS] == ["image", "scan", "fleet", "setting"]
     for way in WAYS:
-        assert [int(number) for number in re.findall(r"^(\d)\. ", way, re.MULTILINE)][-1] == 8
+        assert [int(number) for number in re.findall(r"^(\d)\. ", way, re.MULTILINE)][-1] <= 8
 
 
 @pytest.mark.parametrize("name", sorted({*NAMES, *TERMS}))
