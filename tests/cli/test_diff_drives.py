@@ -133,6 +133,6 @@ def test_what_is_damaged_is_said(drives: tuple[Path, Path], tmp_path: Path, caps
     cut.write_bytes(drives[1].read_bytes()[:-300])
     assert run(drives[0], cut, "--drives") == USAGE
     assert "recover the log first" in capsys.readouterr().err
-    (tmp_path / "m.db").write_bytes(b"SQLite format 3\0")
+    (tmp_path / "m.db").write_bytes(b"SQLite format 3\0".ljust(68, b"\0") + b"MCLM")  # a map by its id
     assert run(tmp_path / "m.db", tmp_path / "m.db", "--drives") == USAGE
     assert "maps are compared as they are" in capsys.readouterr().err
