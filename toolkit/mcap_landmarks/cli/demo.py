@@ -21,7 +21,7 @@ def command(
     """
     from mcap_landmarks.cli import evaluate, localize, plot, report
     from mcap_landmarks.cli import map as build
-    from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions
+    from mcap_landmarks.cli.option_groups import ImageOptions, LogOptions, ScanOptions, SegmentOptions
     from mcap_landmarks.resources import resource
     from mcap_landmarks.runs.outputs import make_folder
 
@@ -29,7 +29,7 @@ def command(
     seen, asked = resource("recordings", "demo_map.mcap"), resource("recordings", "demo_localize.mcap")
     database, mapped, localized = folder / "map.db", folder / "mapped.mcap", folder / "localized.mcap"
     picture, page = folder / "localized.png", folder / "report.html"
-    given = ImageOptions(), ScanOptions(), LogOptions()
+    given = ImageOptions(), ScanOptions(), LogOptions(), SegmentOptions()
 
     say(f"$ mcap-landmarks map {seen} --map {database} -o {mapped}")
     build.command([seen], database, *given, output=mapped)
