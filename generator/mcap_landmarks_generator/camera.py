@@ -5,19 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 from mcap_landmarks.geometry.angles import wrap
-from mcap_landmarks.messages.images import CameraInfo
 from numpy.typing import NDArray
 
-from mcap_landmarks_generator.clock import Delivered, Delivery, measurement_times
+from mcap_landmarks_generator.clock import Delivered, Delivery, measurement_times, to_ns
 from mcap_landmarks_generator.history import History, rotate
 from mcap_landmarks_generator.odometry import true_poses
 from mcap_landmarks_generator.randomness import Stream, draws
-from mcap_landmarks_generator.robot import BASE_FROM_OPTICAL, CAMERA_IN_BASE_M, OPTICAL_FRAME
+from mcap_landmarks_generator.robot import BASE_FROM_OPTICAL, CAMERA_IN_BASE_M
 from mcap_landmarks_generator.sensor_specs import CameraSpec
 
 Floats = NDArray[np.float64]
 
 _TURN_OVER_NS = 8_000_000
+_ROWS_NS = 4_000_000
+"""A rolling shutter's views are so far apart: a step of physics, between which the robot moves evenly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,15 +34,6 @@ class Intrinsics:
         """From width, height and horizontal field of view."""
         focal_px = spec.width_px / 2 / np.tan(np.deg2rad(spec.field_of_view_deg) / 2)
         return cls(spec.width_px, spec.height_px, float(focal_px))
-
-    def info(self, stamp_ns: int) -> CameraInfo:
-        """The message of an image with the given stamp."""
-        matrix = np.array(
-            [[self.focal_px, 0.0, self.width_px / 2], [0.0, self.focal_px, self.height_px / 2], [0.0, 0.0, 1.0]]
-        )
-        projection = np.column_stack([matrix, np.zeros(3)])
-        size = (self.height_px, self.width_px)
-        return CameraInfo(stamp_ns, OPTICAL_FRAME, *size, "plumb_bob", np.zeros(5), matrix, np.eye(3), projection)
 
     def rays(self) -> NDArray[np.float32]:
         """Unit vectors (H, W, 3) in the optical frame through the middles of the pixels."""
@@ -70,13 +62,15 @@ class Viewpoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageJob:
-    """An image to take: the view in the middle of its exposure, and how fast the camera turns meanwhile."""
+    """An image to take: the view in the middle of its exposure and readout, and how fast the camera turns then."""
 
     index: int
     stamp_ns: int
     log_time_ns: int
     view: Viewpoint
     turn_radps: float
+    readout: tuple[Viewpoint, ...] = ()
+    """Of a rolling shutter: views from the first row's time to the last one's, evenly spaced."""
 
 
 class Camera:
@@ -88,27 +82,36 @@ class Camera:
         self._delivery = Delivery(spec, seed, Stream.CAMERA_DELIVERY, start_ns)
         self._next_ns = next(self._times)
         self._index = 0
+        self._readout_ns = to_ns(spec.rolling_shutter_s)
 
     def measure(self, history: History) -> Iterator[ImageJob]:
-        """The images whose time lies in the past."""
-        while self._next_ns <= history.end_ns:
+        """The images whose last row's time lies in the past."""
+        while self._next_ns + self._readout_ns <= history.end_ns:
             if self._spec.when == "always" or (self._spec.when == "stops" and history.standing(self._next_ns)):
-                delivered = self._delivery.of(self._next_ns)
+                delivered = self._delivery.of(self._next_ns, self._readout_ns)
                 if delivered is not None:
                     yield self._job(history, self._next_ns, delivered)
                 self._index += 1
             self._next_ns = next(self._times)
 
     def _job(self, history: History, time_ns: int, delivered: Delivered) -> ImageJob:
-        at_ns = np.array([time_ns])
-        orientation = history.orientations(at_ns)
-        world_from_base = rotate(np.repeat(orientation, 3, axis=0), np.eye(3)).T
-        before, now = true_poses(history, np.array([max(0, time_ns - _TURN_OVER_NS), time_ns]))[:, 2]
-        eye = history.positions(at_ns)[0] + world_from_base @ CAMERA_IN_BASE_M
+        middle_ns = time_ns + self._readout_ns // 2
+        before, now = true_poses(history, np.array([max(0, middle_ns - _TURN_OVER_NS), middle_ns]))[:, 2]
+        steps = -(-self._readout_ns // _ROWS_NS)
+        row_times = [time_ns + self._readout_ns * step // steps for step in range(steps + 1)] if steps else []
         return ImageJob(
             index=self._index,
             stamp_ns=delivered.stamp_ns,
             log_time_ns=delivered.log_time_ns,
-            view=Viewpoint(eye, world_from_base @ BASE_FROM_OPTICAL, time_ns / 1e9),
+            view=_view(history, middle_ns),
             turn_radps=float(wrap(now - before)) / (_TURN_OVER_NS / 1e9),
+            readout=tuple(_view(history, row_ns) for row_ns in row_times),
         )
+
+
+def _view(history: History, time_ns: int) -> Viewpoint:
+    at_ns = np.array([time_ns])
+    orientation = history.orientations(at_ns)
+    world_from_base = rotate(np.repeat(orientation, 3, axis=0), np.eye(3)).T
+    eye = history.positions(at_ns)[0] + world_from_base @ CAMERA_IN_BASE_M
+    return Viewpoint(eye, world_from_base @ BASE_FROM_OPTICAL, time_ns / 1e9)

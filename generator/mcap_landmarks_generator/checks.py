@@ -10,11 +10,13 @@ from mcap_landmarks.errors import ToolkitError
 from numpy.typing import NDArray
 
 from mcap_landmarks_generator import footprints
+from mcap_landmarks_generator.distortion import Lens
 from mcap_landmarks_generator.groups import arrange
 from mcap_landmarks_generator.layout import PlacedObject, built, place
 from mcap_landmarks_generator.loading import LoadedScenario
 from mcap_landmarks_generator.scenario import Scenario
 from mcap_landmarks_generator.sdf_world import read_world
+from mcap_landmarks_generator.sensor_specs import CameraSpec
 from mcap_landmarks_generator.toml_lines import KeyPath
 from mcap_landmarks_generator.world_objects import objects_of
 
@@ -23,6 +25,8 @@ Floats = NDArray[np.float64]
 ROBOT_RADIUS_M = 0.24
 """Radius of the circle about base_footprint that holds the robot, in whichever direction it turns."""
 WALKER_RADIUS_M = 0.3
+_FISHEYE = 4
+"""Coefficients of the model equidistant."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,6 +58,7 @@ def stage(loaded: LoadedScenario) -> Staged:
         loaded = loaded.with_world(scenario.world.file, len(objects))
         scenario = replace(scenario, objects=objects, groups=None, world=None)
     _check_variants(loaded, scenario)
+    _check_lens(loaded, scenario.camera, ("camera", "distortion"))
     if scenario.groups is not None:
         if scenario.trajectory.waypoints:
             raise loaded.fault(("trajectory", "waypoints"), "groups bring a way of their own; remove one of the two")
@@ -92,6 +97,14 @@ def _check_variants(loaded: LoadedScenario, scenario: Scenario) -> None:
             built(spec.class_name, spec.variant, spec.look)
         except ToolkitError as error:
             raise loaded.fault(("objects", i, "variant"), str(error)) from error
+
+
+def _check_lens(loaded: LoadedScenario, spec: CameraSpec, where: KeyPath) -> None:
+    if spec.distortion_model == "equidistant" and (len(spec.distortion) > _FISHEYE or not any(spec.distortion)):
+        # Readers such as ROS's image_geometry take coefficients that are all zero for a camera without distortion.
+        raise loaded.fault(where, "equidistant has k1 to k4, and one of them must not be zero")
+    if Lens.of(spec).folds_inside(spec.field_of_view_deg):
+        raise loaded.fault(where, "it folds the image back before its corners; take weaker ones or a narrower view")
 
 
 def _check_objects(loaded: LoadedScenario, placed: Sequence[PlacedObject], models: Sequence[str]) -> None:

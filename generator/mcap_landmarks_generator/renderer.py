@@ -118,12 +118,15 @@ class Renderer:
 
     def silhouette_px(self, view: Viewpoint, one: Visible) -> float:
         """Area in pixels of the image of an object's labelled parts, were none hidden by an object or the edge."""
+        return float(self.silhouette(view, one).mean()) * one.window.width * one.window.height
+
+    def silhouette(self, view: Viewpoint, one: Visible) -> NDArray[np.bool_]:
+        """Mask (h, w) of these parts in the object's window, of a resolution of its own."""
         area_px = one.window.width * one.window.height
         scale = SUPERSAMPLING * min(1.0, float(np.sqrt(_SILHOUETTE_AREA_PX / area_px)))
         (bodies,) = self._alone.show([one.placed], view.time_s)
         _, body_ids = self._alone.render(view, one.window, scale)
-        labelled = np.isin(body_ids, [body.body_id for body in bodies if body.labelled])
-        return float(labelled.mean()) * area_px
+        return np.isin(body_ids, [body.body_id for body in bodies if body.labelled])
 
     def _in_view(self, view: Viewpoint) -> list[tuple[PlacedObject, Window]]:
         """Objects within reach whose bounding box meets the image, with the window that holds the box."""

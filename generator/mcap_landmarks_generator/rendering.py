@@ -2,6 +2,7 @@
 
 import signal
 from collections import deque
+from collections.abc import Callable
 from contextlib import ExitStack
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -14,12 +15,14 @@ from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.messages.images import CompressedImage
 from mcap_landmarks.stage import Stamped
 
-from mcap_landmarks_generator.camera import ImageJob, Intrinsics
+from mcap_landmarks_generator.camera import ImageJob
 from mcap_landmarks_generator.checks import Staged
+from mcap_landmarks_generator.distortion import Lens
+from mcap_landmarks_generator.lens_renderer import LensRenderer, has_plain_lens
 from mcap_landmarks_generator.optics import Optics
-from mcap_landmarks_generator.renderer import Renderer
+from mcap_landmarks_generator.renderer import Rendered, Renderer
 from mcap_landmarks_generator.robot import OPTICAL_FRAME
-from mcap_landmarks_generator.visibility import true_detections
+from mcap_landmarks_generator.visibility import Drawn, true_detections
 
 Messages = tuple[Stamped, ...]
 
@@ -32,10 +35,17 @@ class Photographer:
     def __init__(self, staged: Staged) -> None:
         cv2.setNumThreads(1)
         spec, seed = staged.scenario.camera, staged.scenario.seed
-        self._intrinsics = Intrinsics.of(spec)
-        self._optics = Optics(spec, self._intrinsics.focal_px, seed)
+        self._lens = Lens.of(spec)
+        self._optics = Optics(spec, self._lens.focal_px, seed)
         self._stack = ExitStack()
-        self._renderer = self._stack.enter_context(Renderer(staged.scenario, staged.objects))
+        if has_plain_lens(spec):
+            renderer = self._stack.enter_context(Renderer(staged.scenario, staged.objects))
+            self._drawn_by: Drawn = renderer
+            self._draw: Callable[[ImageJob], Rendered] = lambda job: renderer.draw(job.view)
+        else:
+            bending = self._stack.enter_context(LensRenderer(staged.scenario, staged.objects))
+            self._drawn_by = bending
+            self._draw = lambda job: bending.draw(job.view, job.readout)
 
     def close(self) -> None:
         """Disconnect from PyBullet."""
@@ -43,11 +53,11 @@ class Photographer:
 
     def take(self, job: ImageJob) -> Messages:
         """The messages of one image."""
-        rendered = self._renderer.draw(job.view)
-        detections = true_detections(rendered, self._renderer, job.view, job.stamp_ns)
+        rendered = self._draw(job)
+        detections = true_detections(rendered, self._drawn_by, job.view, job.stamp_ns)
         exposed = self._optics.expose(rendered.image, job.index, job.turn_radps, job.view.time_s)
         image = CompressedImage(job.stamp_ns, OPTICAL_FRAME, "jpeg", self._optics.jpeg(exposed))
-        info = self._intrinsics.info(job.stamp_ns)
+        info = self._lens.info(job.stamp_ns, OPTICAL_FRAME)
         return (
             Stamped(CAMERA_IMAGE, job.log_time_ns, image),
             Stamped(CAMERA_INFO, job.log_time_ns, info),

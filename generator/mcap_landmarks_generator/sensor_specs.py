@@ -62,6 +62,12 @@ class CameraSpec(SensorSpec):
     """Height of the image."""
     field_of_view_deg: Annotated[float, Field(ge=5, le=150)] = 62.2
     """Horizontal field of view."""
+    distortion_model: Literal["plumb_bob", "equidistant"] = "plumb_bob"
+    """How the lens bends the image: plumb_bob, or equidistant for a fisheye, as ROS's CameraInfo has them."""
+    distortion: Annotated[tuple[float, ...], Field(max_length=5)] = ()
+    """k1, k2, p1, p2, k3 of plumb_bob, k1 to k4 of equidistant; what is left out is zero."""
+    rolling_shutter_s: Annotated[float, Field(ge=0, le=0.2)] = 0.0
+    """Time from the first row, which the stamp is of, to the last; 0 takes all rows at once."""
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 85
     """Quality of the JPEG."""
     exposure: Positive = 1.0

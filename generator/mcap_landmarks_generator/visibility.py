@@ -1,6 +1,7 @@
 """Which objects an image shows, where, and how much of each: the truth about its detections."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -8,13 +9,24 @@ from mcap_landmarks.messages.detections import Detections
 
 from mcap_landmarks_generator.assets.catalog import COCO_ID
 from mcap_landmarks_generator.camera import Viewpoint
-from mcap_landmarks_generator.renderer import SUPERSAMPLING, Rendered, Renderer, Visible
+from mcap_landmarks_generator.renderer import SUPERSAMPLING, Rendered, Visible
 from mcap_landmarks_generator.robot import OPTICAL_FRAME
 
 _LEAST_AREA_PX = 4.0
 
 
-def true_detections(rendered: Rendered, renderer: Renderer, view: Viewpoint, stamp_ns: int) -> Detections:
+class Drawn(Protocol):
+    """What drew an image: a `Renderer`, or one with a lens."""
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height of the image."""
+
+    def silhouette_px(self, view: Viewpoint, one: Visible) -> float:
+        """Area in pixels of the image of an object's labelled parts, were none hidden by an object or the edge."""
+
+
+def true_detections(rendered: Rendered, renderer: Drawn, view: Viewpoint, stamp_ns: int) -> Detections:
     """Box of the visible labelled parts of each object, from the mask; the score is the visible share of them.
 
     The share counts what other objects and the image's edges hide. Objects are left out that show less than 4 pixels.
@@ -70,7 +82,7 @@ def _seen(rendered: Rendered, one: Visible) -> _Seen | None:
     return _Seen((float(x[0]), float(y[0]), float(x[1]), float(y[1])), area_px, beside)
 
 
-def _beyond_edge(one: Visible, renderer: Renderer) -> bool:
+def _beyond_edge(one: Visible, renderer: Drawn) -> bool:
     """Whether an object may reach beyond the image."""
     width, height = renderer.size_px
     window = one.window

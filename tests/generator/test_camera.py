@@ -9,10 +9,11 @@ from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.transforms import TFMessage
 from mcap_landmarks_generator.camera import Intrinsics, Viewpoint
 from mcap_landmarks_generator.checks import Staged, stage
+from mcap_landmarks_generator.distortion import Lens
 from mcap_landmarks_generator.loading import load_scenario
 from mcap_landmarks_generator.optics import Optics
 from mcap_landmarks_generator.renderer import Renderer
-from mcap_landmarks_generator.robot import BASE_FROM_OPTICAL, CAMERA_IN_BASE_M
+from mcap_landmarks_generator.robot import BASE_FROM_OPTICAL, CAMERA_IN_BASE_M, OPTICAL_FRAME
 from mcap_landmarks_generator.sensor_specs import CameraSpec
 from mcap_landmarks_generator.simulation import static_transforms
 from mcap_landmarks_generator.visibility import true_detections
@@ -80,7 +81,7 @@ def optical_from_base() -> tuple[Floats, Floats]:
 def test_boxes_contain_the_projected_centres(scene: tuple[Staged, Renderer], pose: tuple[float, float, float]) -> None:
     """Through CameraInfo and /tf_static; a sign's centre is that of the sign without its post."""
     staged = scene[0]
-    matrix = Intrinsics.of(staged.scenario.camera).info(0).intrinsics
+    matrix = Lens.of(staged.scenario.camera).info(0, "").intrinsics
     rotation, offset = optical_from_base()
     found = detections_from(scene, view_from(*pose))
     c, s = np.cos(np.deg2rad(pose[2])), np.sin(np.deg2rad(pose[2]))
@@ -142,7 +143,7 @@ def test_an_empty_view_is_sky_above_ground(scene: tuple[Staged, Renderer]) -> No
 
 
 def test_the_camera_is_the_turtlebot_s() -> None:
-    info = Intrinsics.of(CameraSpec()).info(5)
+    info = Lens.of(CameraSpec()).info(5, OPTICAL_FRAME)
     assert (info.width_px, info.height_px, info.frame_id) == (640, 480, "camera_rgb_optical_frame")
     assert info.intrinsics[0, 0] == pytest.approx(530.5, abs=0.1)
     rotation, offset = optical_from_base()
