@@ -24,7 +24,8 @@ Floats = NDArray[np.float64]
 
 ROBOT_RADIUS_M = 0.24
 """Radius of the circle about base_footprint that holds the robot, in whichever direction it turns."""
-WALKER_RADIUS_M = 0.3
+_WALKER_RADIUS_M = 0.3
+"""What one who walks needs to either side; a car half of its width."""
 _FISHEYE = 4
 """Coefficients of the model equidistant."""
 
@@ -125,8 +126,10 @@ def _check_objects(loaded: LoadedScenario, placed: Sequence[PlacedObject], model
 
 def _check_walk(loaded: LoadedScenario, i: int, placed: Sequence[PlacedObject], names: Sequence[str]) -> None:
     walker = placed[i]
+    low, high = walker.asset.bounds_m
+    radius_m = max(_WALKER_RADIUS_M, float(high[1] - low[1]) / 2)
     for k, (start, end) in enumerate(pairwise([*walker.route_xy, walker.route_xy[0]])):
-        blocking = _blocking(start, end, placed, WALKER_RADIUS_M)
+        blocking = _blocking(start, end, placed, radius_m)
         if blocking is not None:
             place = min(k, len(walker.route_xy) - 2)
             problem = f"{names[i]} would walk into {names[placed.index(blocking)]}; move one of them"

@@ -37,7 +37,7 @@ def _among(names: tuple[str, ...]) -> Callable[[str], str]:
     return check
 
 
-_OBJECTS = catalog.CLASSES + catalog.DISTRACTORS
+_OBJECTS = catalog.CLASSES + catalog.DISTRACTORS + catalog.STRUCTURES
 StandIn = Annotated[str, AfterValidator(_among(("", *_OBJECTS))), Field(json_schema_extra={"enum": ["", *_OBJECTS]})]
 ClassName = Annotated[str, AfterValidator(_among(_OBJECTS)), Field(json_schema_extra={"enum": list(_OBJECTS)})]
 Ground = Annotated[str, AfterValidator(_among(ground.KINDS)), Field(json_schema_extra={"enum": list(ground.KINDS)})]
@@ -51,7 +51,7 @@ class ObjectSpec:
     __pydantic_config__: ClassVar[ConfigDict] = CONFIG
 
     class_name: Annotated[ClassName, Field(alias="class")]
-    """Class or distractor, as the generator's catalog names it."""
+    """Class, distractor or structure, as the generator's catalog names it."""
     at: Point
     """Where the centre of its section at LiDAR height stands, in metres of the frame map."""
     yaw_deg: float = 0.0
@@ -61,9 +61,9 @@ class ObjectSpec:
     look: Seed = 0
     """Seed of its shape and texture."""
     walk: tuple[Point, ...] = ()
-    """Points that it walks to, one after the other, and back to its start, again and again."""
+    """Points that it walks or drives to, one after the other, and back to its start, again and again."""
     speed_mps: Positive = 0.8
-    """Speed of walking."""
+    """Its speed there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,7 +97,7 @@ class WorldSpec:
     file: str
     """The world's file, beside this one."""
     classes: dict[str, StandIn] = field(default_factory=dict)
-    """Class or distractor of models by pattern of their names or URIs, such as "shelf_*"; empty leaves them out."""
+    """Class (or distractor, or structure) of models by pattern of names or URIs, such as "shelf_*"; empty: left out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

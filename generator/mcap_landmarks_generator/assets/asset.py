@@ -68,7 +68,7 @@ class Variant:
 class AssetClass:
     """One class of objects, its variants by name, the default first.
 
-    A module of this package's `classes` or `distractors` declares exactly one, as `CLASS`.
+    A module of this package's `classes`, `distractors` or `structures` declares exactly one, as `CLASS`.
     """
 
     name: str

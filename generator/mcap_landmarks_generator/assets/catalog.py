@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 from mcap_landmarks.errors import ToolkitError
 
-from mcap_landmarks_generator.assets import classes, distractors
+from mcap_landmarks_generator.assets import classes, distractors, structures
 from mcap_landmarks_generator.assets.asset import Asset, AssetClass, Variant, assemble
 from mcap_landmarks_generator.assets.section import Section
 
@@ -26,10 +26,12 @@ def _found(package: ModuleType) -> dict[str, AssetClass]:
 
 _CLASSES = _found(classes)
 _DISTRACTORS = _found(distractors)
-_ALL = {**_CLASSES, **_DISTRACTORS}
+_STRUCTURES = _found(structures)
+_ALL = {**_CLASSES, **_DISTRACTORS, **_STRUCTURES}
 
 CLASSES: tuple[str, ...] = tuple(_CLASSES)
 DISTRACTORS: tuple[str, ...] = tuple(_DISTRACTORS)
+STRUCTURES: tuple[str, ...] = tuple(_STRUCTURES)
 COCO_ID: dict[str, int] = {name: entry.coco_id for name, entry in _CLASSES.items() if entry.coco_id is not None}
 VARIANTS: dict[str, tuple[str, ...]] = {name: tuple(entry.variants) for name, entry in _ALL.items()}
 

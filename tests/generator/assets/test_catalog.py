@@ -41,9 +41,10 @@ def digest(asset: Asset) -> str:
     return state.hexdigest()
 
 
-def test_classes_are_the_twelve_and_seven() -> None:
+def test_classes_distractors_and_structures() -> None:
     assert set(catalog.CLASSES) == set(HEIGHT_M)
     assert set(catalog.DISTRACTORS) == {"cone", "barrel", "box", "bollard", "tree", "table", "pole"}
+    assert set(catalog.STRUCTURES) == {"kerb", "facade", "hedge", "bank", "shelving", "reflector", "tag"}
     assert catalog.COCO_ID["stop sign"] == 11
     assert catalog.COCO_ID["potted plant"] == 58
     assert len(set(catalog.COCO_ID.values())) == 12
