@@ -35,15 +35,6 @@ class Intrinsics:
         focal_px = spec.width_px / 2 / np.tan(np.deg2rad(spec.field_of_view_deg) / 2)
         return cls(spec.width_px, spec.height_px, float(focal_px))
 
-    def rays(self) -> NDArray[np.float32]:
-        """Unit vectors (H, W, 3) in the optical frame through the middles of the pixels."""
-        u = (np.arange(self.width_px) + 0.5 - self.width_px / 2) / self.focal_px
-        v = (np.arange(self.height_px) + 0.5 - self.height_px / 2) / self.focal_px
-        rays = np.empty((self.height_px, self.width_px, 3))
-        rays[..., 0], rays[..., 1], rays[..., 2] = u[None, :], v[:, None], 1.0
-        unit: NDArray[np.float32] = (rays / np.linalg.norm(rays, axis=2, keepdims=True)).astype(np.float32)
-        return unit
-
     def project(self, points: Floats) -> Floats:
         """Pixels (N, 2) of points (N, 3) in the optical frame, all in front of the camera."""
         centre = np.array([self.width_px / 2, self.height_px / 2])

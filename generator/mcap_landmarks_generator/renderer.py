@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks_generator.assets import ground, sky
-from mcap_landmarks_generator.assets.backdrop import Backdrop, Shadow, cast_shadow
+from mcap_landmarks_generator.assets.backdrop import Backdrop, Pinhole
 from mcap_landmarks_generator.assets.bullet import Body
+from mcap_landmarks_generator.assets.shadow import Shadow, cast_shadow
 from mcap_landmarks_generator.camera import Intrinsics, Viewpoint
 from mcap_landmarks_generator.drawing import NEAR_M, Drawing, Image, Window
 from mcap_landmarks_generator.layout import PlacedObject
@@ -76,8 +77,8 @@ class Renderer:
         self._moving = np.array([placed.moves for placed in objects], dtype=bool)
         self._reach_m = np.array([placed.asset.footprint_radius_m for placed in objects])
         self._corners = [_corners(placed) for placed in objects]
-        self._rays = self._intrinsics.rays()
         self._backdrop = Backdrop(
+            Pinhole.of(*self.size_px, self._intrinsics.focal_px),
             sky.panorama(scenario.background.kind, scenario.background.look),
             ground.texture(scenario.ground.kind, scenario.ground.look),
             scenario.ground.tile_m,
@@ -100,8 +101,7 @@ class Renderer:
         in_view = self._in_view(view)
         image = self._backdrop.view(
             view.eye_m,
-            self._rays @ view.world_from_optical.T.astype(np.float32),
-            1 / self._intrinsics.focal_px,
+            view.world_from_optical,
             self._shadows_in(view, [placed for placed, _ in in_view]),
             self._light.shade,
         )

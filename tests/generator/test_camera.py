@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.messages.transforms import TFMessage
-from mcap_landmarks_generator.camera import Intrinsics, Viewpoint
+from mcap_landmarks_generator.camera import Viewpoint
 from mcap_landmarks_generator.checks import Staged, stage
 from mcap_landmarks_generator.distortion import Lens
 from mcap_landmarks_generator.loading import load_scenario
@@ -150,14 +150,6 @@ def test_the_camera_is_the_turtlebot_s() -> None:
     assert -rotation.T @ offset == pytest.approx([0.076, 0.0, 0.103], abs=1e-9)
     assert -rotation.T @ offset == pytest.approx(CAMERA_IN_BASE_M)
     assert pytest.approx(BASE_FROM_OPTICAL, abs=1e-12) == rotation.T
-
-
-def test_rays_go_through_the_pixels_they_belong_to() -> None:
-    camera = Intrinsics(64, 48, 50.0)
-    rays = camera.rays()
-    pixels = camera.project(rays[[0, 47], [0, 63]].astype(np.float64))
-    assert pixels == pytest.approx(np.array([[0.5, 0.5], [63.5, 47.5]]), abs=1e-4)
-    assert np.linalg.norm(rays, axis=2) == pytest.approx(1.0, abs=1e-6)
 
 
 def test_noise_blur_and_exposure_do_what_they_say() -> None:

@@ -8,8 +8,9 @@ import numpy as np
 
 from mcap_landmarks_generator.assets import catalog, ground, sky
 from mcap_landmarks_generator.assets.asset import Asset
-from mcap_landmarks_generator.assets.backdrop import Backdrop, cast_shadow
+from mcap_landmarks_generator.assets.backdrop import Backdrop, Pinhole
 from mcap_landmarks_generator.assets.bullet import AssetStore
+from mcap_landmarks_generator.assets.shadow import cast_shadow
 from mcap_landmarks_generator.assets.texture import Image
 from mcap_landmarks_generator.engine import pybullet
 
@@ -24,7 +25,9 @@ YAWS_RAD = (np.pi + 0.5, np.pi - 0.9)
 def sheet(seed: int = 0) -> Image:
     """Every variant of every class and two of each distractor, in rows of eight."""
     names = [(name, variant) for name in (*catalog.CLASSES, *catalog.DISTRACTORS) for variant in catalog.VARIANTS[name]]
-    backdrop = Backdrop(sky.panorama("trees", 3), ground.texture("concrete", 4))
+    width, height = (side * OVERSAMPLING for side in CELL_PX)
+    camera = Pinhole.of(width, height, height / 2 / np.tan(FIELD_OF_VIEW_RAD / 2))
+    backdrop = Backdrop(camera, sky.panorama("trees", 3), ground.texture("concrete", 4))
     client = pybullet.connect(pybullet.DIRECT)
     cells = []
     try:
@@ -59,24 +62,18 @@ def _cell(client: int, store: AssetStore, backdrop: Backdrop, asset: Asset, yaw_
         pybullet.removeBody(body.body_id, physicsClientId=client)
     image = np.array(rgba, np.uint8).reshape(height, width, 4)[..., :3]
     behind = np.array(segmentation).reshape(height, width) < 0
-    image[behind] = _behind(backdrop, asset, yaw_rad, eye, target, (width, height))[behind]
+    image[behind] = _behind(backdrop, asset, yaw_rad, eye, target)[behind]
     small = cv2.resize(image, CELL_PX, interpolation=cv2.INTER_AREA)
     return np.asarray(small, np.uint8)
 
 
-def _behind(
-    backdrop: Backdrop, asset: Asset, yaw_rad: float, eye: np.ndarray, target: np.ndarray, size_px: tuple[int, int]
-) -> Image:
+def _behind(backdrop: Backdrop, asset: Asset, yaw_rad: float, eye: np.ndarray, target: np.ndarray) -> Image:
     """Sky and ground with the asset's shadow, for a camera that looks from `eye` to `target`."""
     forward = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
-    width, height = size_px
-    focal_px = height / 2 / np.tan(FIELD_OF_VIEW_RAD / 2)
-    u, v = np.meshgrid(np.arange(width) + 0.5 - width / 2, np.arange(height) + 0.5 - height / 2)
-    rays = focal_px * forward + u[..., None] * right - v[..., None] * np.cross(right, forward)
-    rays /= np.linalg.norm(rays, axis=2, keepdims=True)
-    return backdrop.view(eye, rays, 1 / focal_px, [cast_shadow(asset, yaw_rad, TOWARDS_LIGHT)])
+    turn = np.column_stack([right, np.cross(forward, right), forward])
+    return backdrop.view(eye, turn, [cast_shadow(asset, yaw_rad, TOWARDS_LIGHT)])
 
 
 def main() -> None:

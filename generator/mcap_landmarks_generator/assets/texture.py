@@ -2,7 +2,6 @@
 
 import colorsys
 from collections.abc import Sequence
-from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -10,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 
 Image = NDArray[np.uint8]
 Colour = NDArray[np.float64]
-Pixel = TypeVar("Pixel", np.uint8, np.float32)
 
 
 def hsv(hue: float, saturation: float, value: float) -> Colour:
@@ -53,19 +51,6 @@ def _tiling(coarse: NDArray[np.float64], height_px: int, width_px: int) -> NDArr
     padded = np.pad(coarse, 2, mode="wrap").astype(np.float32)
     y, x = np.meshgrid(np.arange(height_px) * n / height_px + 2, np.arange(width_px) * n / width_px + 2, indexing="ij")
     return cv2.remap(padded, x.astype(np.float32), y.astype(np.float32), cv2.INTER_CUBIC).astype(float)
-
-
-def look_up(
-    image: NDArray[Pixel], columns: NDArray[np.floating], rows: NDArray[np.floating], repeats: bool
-) -> NDArray[Pixel]:
-    """Values (N,...) of an image (H,W,...) at N places, bilinear; beyond the edges it repeats itself, or is zero."""
-    # OpenCV's maps may not be longer than a 16-bit number in either direction.
-    width = 4096
-    missing = -len(columns) % width
-    x, y = (np.pad(np.asarray(axis, np.float32), (0, missing)).reshape(-1, width) for axis in (columns, rows))
-    border = cv2.BORDER_WRAP if repeats else cv2.BORDER_CONSTANT
-    values = cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=border)
-    return np.asarray(values, image.dtype).reshape(-1, *image.shape[2:])[: len(columns)]
 
 
 def to_image(values: ArrayLike) -> Image:
