@@ -1,11 +1,16 @@
 """Fixtures that every test may use."""
 
+import os
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+# As the command line does, which would be too late: threads that share products of small matrices mostly wait for each
+# other, and NumPy reads this when it is first imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from mcap_landmarks.networks import cache
 
 from tests.remote.object_store import Bucket, new_bucket, serving_s3, use_server
