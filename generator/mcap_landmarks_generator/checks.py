@@ -70,8 +70,11 @@ def stage(loaded: LoadedScenario) -> Staged:
             groups=None,
             trajectory=replace(scenario.trajectory, waypoints=way),
         )
-    placed = place(scenario.objects)
-    _check_objects(loaded, placed, models)
+    present = [i for i, spec in enumerate(scenario.objects) if not spec.sessions or scenario.session in spec.sessions]
+    # Of all sessions' objects the present ones: an object has one id in all of them.
+    everything = place(scenario.objects)
+    placed = tuple(everything[i] for i in present)
+    _check_objects(loaded, placed, present, models)
     staged = Staged(loaded.name, scenario, placed, start_pose(scenario), warnings)
     _check_way(loaded, staged)
     return staged
@@ -108,8 +111,13 @@ def _check_lens(loaded: LoadedScenario, spec: CameraSpec, where: KeyPath) -> Non
         raise loaded.fault(where, "it folds the image back before its corners; take weaker ones or a narrower view")
 
 
-def _check_objects(loaded: LoadedScenario, placed: Sequence[PlacedObject], models: Sequence[str]) -> None:
-    """Refuse objects inside each other, or that walk into others; of a world's `models` these are named, too."""
+def _check_objects(
+    loaded: LoadedScenario, placed: Sequence[PlacedObject], present: Sequence[int], models: Sequence[str]
+) -> None:
+    """Refuse objects inside each other, or that walk into others; of a world's `models` these are named, too.
+
+    `present` are their places among all objects of the scenario.
+    """
     names = [one.object_id for one in placed]
     if models:
         names = [f"{name} (model {model})" for name, model in zip(names, models, strict=True)]
@@ -119,21 +127,22 @@ def _check_objects(loaded: LoadedScenario, placed: Sequence[PlacedObject], model
         away = np.hypot(*(centres[:i] - centres[i]).T)
         for k in np.flatnonzero(away < reaches[:i] + reaches[i]).tolist():
             if footprints.overlap(placed[k], second):
-                raise loaded.fault(("objects", i), f"{names[i]} stands inside {names[k]}; move one of them")
+                raise loaded.fault(("objects", present[i]), f"{names[i]} stands inside {names[k]}; move one of them")
         if second.moves:
-            _check_walk(loaded, i, placed, names)
+            _check_walk(loaded, second, placed, present[i], names)
 
 
-def _check_walk(loaded: LoadedScenario, i: int, placed: Sequence[PlacedObject], names: Sequence[str]) -> None:
-    walker = placed[i]
+def _check_walk(
+    loaded: LoadedScenario, walker: PlacedObject, placed: Sequence[PlacedObject], number: int, names: Sequence[str]
+) -> None:
     low, high = walker.asset.bounds_m
     radius_m = max(_WALKER_RADIUS_M, float(high[1] - low[1]) / 2)
     for k, (start, end) in enumerate(pairwise([*walker.route_xy, walker.route_xy[0]])):
         blocking = _blocking(start, end, placed, radius_m)
         if blocking is not None:
             place = min(k, len(walker.route_xy) - 2)
-            problem = f"{names[i]} would walk into {names[placed.index(blocking)]}; move one of them"
-            raise loaded.fault(("objects", i, "walk", place), problem)
+            problem = f"{names[placed.index(walker)]} would walk into {names[placed.index(blocking)]}; move one of them"
+            raise loaded.fault(("objects", number, "walk", place), problem)
 
 
 def _check_way(loaded: LoadedScenario, staged: Staged) -> None:

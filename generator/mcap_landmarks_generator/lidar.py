@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from mcap_landmarks_generator.clock import Delivery, measurement_times, to_ns
 from mcap_landmarks_generator.history import History, rotate
 from mcap_landmarks_generator.randomness import Stream, draws
+from mcap_landmarks_generator.ring_lidar import intensities_of
 from mcap_landmarks_generator.robot import SCAN_FRAME, SCAN_IN_BASE_M
 from mcap_landmarks_generator.sensor_specs import LidarSpec
-from mcap_landmarks_generator.world import World
+from mcap_landmarks_generator.world import Returns, World
 
 Floats = NDArray[np.float64]
 
@@ -40,14 +41,15 @@ class Lidar:
         while self._next_ns + self._period_ns <= history.end_ns:
             delivered = self._delivery.of(self._next_ns, self._period_ns)
             if delivered is not None:
-                distances = cast(world, history, self._spec, self._next_ns + self._beam_ns)
-                ranges = noisy(distances, self._spec, draws(self._seed, Stream.SCAN, self._index))
-                yield Stamped(SCAN, delivered.log_time_ns, self._message(delivered.stamp_ns, ranges))
+                returns = cast(world, history, self._spec, self._next_ns + self._beam_ns)
+                ranges = noisy(returns.distances_m, self._spec, draws(self._seed, Stream.SCAN, self._index))
+                yield Stamped(SCAN, delivered.log_time_ns, self._message(delivered.stamp_ns, ranges, returns))
             self._index += 1
             self._next_ns = next(self._times)
 
-    def _message(self, stamp_ns: int, ranges: Floats) -> LaserScan:
+    def _message(self, stamp_ns: int, ranges: Floats, returns: Returns) -> LaserScan:
         spec = self._spec
+        intensities = np.where(np.isfinite(ranges), intensities_of(returns), 0.0) if spec.intensities else np.zeros(0)
         return LaserScan(
             stamp_ns=stamp_ns,
             frame_id=SCAN_FRAME,
@@ -59,7 +61,7 @@ class Lidar:
             range_min_m=spec.range_min_m,
             range_max_m=spec.range_max_m,
             ranges_m=ranges.astype(np.float32),
-            intensities=np.zeros(0, np.float32),
+            intensities=intensities.astype(np.float32),
         )
 
 
@@ -68,22 +70,24 @@ def beam_angles(spec: LidarSpec) -> Floats:
     return np.linspace(0.0, ANGLE_MAX_RAD, spec.beams)
 
 
-def cast(world: World, history: History, spec: LidarSpec, times_ns: NDArray[np.int64]) -> Floats:
-    """True distances (N,) along the beams at their times (N,), inf where there is nothing within reach."""
+def cast(world: World, history: History, spec: LidarSpec, times_ns: NDArray[np.int64]) -> Returns:
+    """What the beams meet first at their times (N,), infinitely far where there is nothing within reach."""
     angles = beam_angles(spec)
     directions = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)
     orientations = history.orientations(times_ns)
     starts = history.positions(times_ns) + rotate(orientations, np.broadcast_to(SCAN_IN_BASE_M, directions.shape))
+    rays = rotate(orientations, directions)
     # A little beyond the reach, from where noise can bring an echo back into it.
     reach_m = spec.range_max_m + 4 * spec.sigma_m
-    ends = starts + reach_m * rotate(orientations, directions)
-    pieces = np.array_split(np.arange(spec.beams), _PIECES if world.has_walkers else 1)
-    shares = []
-    for piece in pieces:
+    parts = []
+    for piece in np.array_split(np.arange(spec.beams), _PIECES if world.has_walkers else 1):
         world.move_walkers(float(times_ns[piece].mean()) / 1e9)
-        shares.append(world.cast(starts[piece], ends[piece]))
-    share = np.concatenate(shares)
-    return np.where(share < 1.0, share * reach_m, np.inf)
+        parts.append(world.returns(starts[piece], rays[piece], reach_m))
+    distances, cosines, numbers = (
+        np.concatenate(columns)
+        for columns in zip(*((part.distances_m, part.cosines, part.name_of) for part in parts), strict=True)
+    )
+    return Returns(distances, cosines, parts[0].names, numbers)
 
 
 def noisy(distances: Floats, spec: LidarSpec, rng: np.random.Generator) -> Floats:

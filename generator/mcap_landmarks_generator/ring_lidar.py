@@ -17,10 +17,11 @@ Floats = NDArray[np.float64]
 
 POINTS = Channel("/points", RingCloud)
 RINGS_FRAME = "ring_lidar"
-_REFLECTIVITY = {"stop sign": 1.0, "car": 0.7, "traffic light": 0.5, "tree": 0.35, "": 0.25}
+_REFLECTIVITY = {"stop sign": 1.0, "reflector": 3.0, "car": 0.7, "traffic light": 0.5, "tree": 0.35, "": 0.25}
 _OTHERWISE = 0.45
 """Share of the light at 905 nm that comes back from straight ahead: a road sign's reflecting sheet all of what the
-receiver can tell (it saturates), paint more than cloth, asphalt (the ground, without a name) about a quarter."""
+receiver can tell (it saturates), a reflector's at any angle, paint more than cloth, asphalt (the ground, without a
+name) about a quarter."""
 _EDGE_M = 0.3
 """Neighbouring beams of a ring whose ranges differ by more lie on both sides of an edge."""
 _RAIN_M = 4.0
@@ -54,7 +55,7 @@ class RingLidar:
         after_ns = np.arange(spec.beams, dtype=np.int64) * self._period_ns // spec.beams
         returns = cast_rings(world, history, spec, self._directions, first_ns + after_ns)
         ranges = _measured(returns.distances_m.reshape(spec.beams, spec.rings), spec, rng)
-        intensities = _intensities(returns).reshape(ranges.shape)
+        intensities = intensities_of(returns).reshape(ranges.shape)
         there = np.isfinite(ranges)
         beam, ring = np.nonzero(there)
         return RingCloud(
@@ -114,7 +115,7 @@ def _measured(distances: Floats, spec: RingLidarSpec, rng: np.random.Generator) 
     return np.where(seen, ranges, np.inf)
 
 
-def _intensities(returns: Returns) -> Floats:
+def intensities_of(returns: Returns) -> Floats:
     """Intensities (N,) of 255 as the receiver gives them, distance taken out: material times cosine of the angle."""
     material = np.array([_REFLECTIVITY.get(name, _OTHERWISE) for name in returns.names])[returns.name_of]
     return 255 * np.clip(material * returns.cosines, 0.0, 1.0)

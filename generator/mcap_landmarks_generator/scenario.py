@@ -25,6 +25,7 @@ from mcap_landmarks_generator.sensor_specs import (
 )
 
 Seed = Annotated[int, Field(ge=0)]
+Session = Annotated[int, Field(ge=1)]
 Point = tuple[float, float]
 
 
@@ -64,6 +65,8 @@ class ObjectSpec:
     """Points that it walks or drives to, one after the other, and back to its start, again and again."""
     speed_mps: Positive = 0.8
     """Its speed there."""
+    sessions: tuple[Session, ...] = ()
+    """Sessions in which it is there; in all of them if left out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -207,6 +210,8 @@ class Scenario:
     """What the scenario is for, in one sentence."""
     seed: Seed = 0
     """Seed of all randomness: noise, slip, jitter, groups."""
+    session: Session = 1
+    """Which session this is: between the sessions of one place objects appear and vanish."""
     start_ns: Annotated[int, Field(ge=0, lt=2**62)] = 1_767_225_600_000_000_000
     """Time of the start, in nanoseconds since 1970."""
     objects: tuple[ObjectSpec, ...] = ()

@@ -116,6 +116,8 @@ class LidarSpec(SensorSpec):
     """Share of beams that return nothing."""
     instantaneous: bool = False
     """All beams at the time of the first one, as Gazebo does."""
+    intensities: bool = False
+    """Whether it tells how much light came back, of 255: by material and angle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

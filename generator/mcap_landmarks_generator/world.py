@@ -82,22 +82,8 @@ class World:
         bodies = self.robot.touching() & self._object_of_body.keys()
         return {self._object_of_body[body].object_id for body in bodies}
 
-    def cast(self, starts: Floats, ends: Floats) -> Floats:
-        """How far along each ray from `starts` (N, 3) to `ends` (N, 3) the first body is, as shares (N,); 1 for none.
-
-        Rays pass through the robot.
-        """
-        hits = pybullet.rayTestBatch(
-            starts.tolist(),
-            ends.tolist(),
-            numThreads=1,
-            collisionFilterMask=STATIC_GROUP,
-            physicsClientId=self._client,
-        )
-        return np.array([hit[2] for hit in hits])
-
     def returns(self, starts: Floats, directions: Floats, reach_m: float) -> Returns:
-        """What rays from `starts` (N, 3) along unit vectors `directions` (N, 3) meet within reach; not the robot."""
+        """What rays from `starts` (N, 3) along unit vectors `directions` (N, 3) meet in reach, but for the robot."""
         ends = starts + reach_m * directions
         hits = []
         for first in range(0, len(starts), _MOST_RAYS):

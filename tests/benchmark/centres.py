@@ -70,7 +70,8 @@ def cases(name: str, variants: Sequence[str], seed: int, count: int, spec: Lidar
             heading = bearing + rng.uniform(-_VIEW_RAD, _VIEW_RAD)
             lidar = one.route_xy[0] - range_m * np.array([np.cos(bearing), np.sin(bearing)])
             base = lidar - SCAN_IN_BASE_M[0] * np.array([np.cos(heading), np.sin(heading)])
-            ranges = noisy(cast(world, _standing(base, heading), spec, np.zeros(spec.beams, np.int64)), spec, rng)
+            returns = cast(world, _standing(base, heading), spec, np.zeros(spec.beams, np.int64))
+            ranges = noisy(returns.distances_m, spec, rng)
             local = transform_points(inverse(np.array([*base, heading])), one.route_xy[0])
             yield Case(ranges, name, local, range_m)
 

@@ -71,7 +71,7 @@ def test_lists_the_bundled_scenarios(capsys: pytest.CaptureFixture[str]) -> None
     assert run("--list", "--json") == DONE
     assert "thesis_map" in json.dumps(validated(capsys.readouterr().out))
     assert run("--list") == DONE
-    assert capsys.readouterr().out.startswith("cluttered ")
+    assert capsys.readouterr().out.startswith("campus ")
 
 
 @pytest.mark.parametrize(

@@ -88,7 +88,7 @@ def test_ranges_keep_to_their_noise(staged: Staged, part: str) -> None:
     times = np.zeros(spec.beams, np.int64)
     for world, history in simulated(staged, 50):
         expected = dict(zip(("disc", "box"), analytic(*rays(history, spec, times)), strict=True))[part]
-        distances = cast(world, history, spec, times)
+        distances = cast(world, history, spec, times).distances_m
     seen = np.isfinite(expected)
     errors = np.concatenate(
         [noisy(distances, spec, draws(seed, Stream.SCAN))[seen] - expected[seen] for seed in range(60)]
@@ -104,7 +104,7 @@ def test_beams_miss_what_the_sections_miss(staged: Staged) -> None:
     times = np.zeros(spec.beams, np.int64)
     for world, history in simulated(staged, 1):
         expected = np.minimum(*analytic(*rays(history, spec, times)))
-        hit = np.isfinite(cast(world, history, spec, times))
+        hit = np.isfinite(cast(world, history, spec, times).distances_m)
     assert np.count_nonzero(hit != np.isfinite(expected)) <= 1
     assert np.isfinite(expected).sum() > 50
 
@@ -157,11 +157,29 @@ waypoints = [ { at = [0.0, 0.0], stop_s = 1.0 } ]
     seen = []
     for world, history in simulated(staged, 1000):
         for start_ns in (0, 3_000_000_000):
-            ranges = cast(world, history, spec, np.full(spec.beams, start_ns))
+            ranges = cast(world, history, spec, np.full(spec.beams, start_ns)).distances_m
             seen.append(np.rad2deg(beam_angles(spec)[np.isfinite(ranges)]).mean())
             assert ranges.min() > 1.5
     assert seen[0] == pytest.approx(np.rad2deg(np.arctan2(3.0, 2.064)), abs=1.0)
     assert seen[1] == pytest.approx(180.0, abs=180.0)
+
+
+def test_reflectors_shine_out_where_intensities_are_told(stage_text: StageText) -> None:
+    staged = stage_text(SCENE.replace('"fire hydrant"', '"reflector"'))
+    for world, history in simulated(staged, 100):
+        for is_told in (True, False):
+            spec = LidarSpec(sigma_m=0.0, dropout=0.0, intensities=is_told, instantaneous=True)
+            scan = next(Lidar(spec, seed=0, start_ns=10**18).measure(history, world)).message
+            assert isinstance(scan, LaserScan)
+            if not is_told:
+                assert len(scan.intensities) == 0
+                continue
+            ahead = np.abs(np.sin(beam_angles(spec) - np.arctan2(0.4, 3.064))) < 0.1
+            on_post = ahead & np.isfinite(scan.ranges_m)
+            on_box = ~ahead & np.isfinite(scan.ranges_m)
+            assert scan.intensities[on_post].max() > 240
+            assert 0 < scan.intensities[on_box].max() < 120
+            assert not scan.intensities[~np.isfinite(scan.ranges_m)].any()
 
 
 def test_rotation_by_quaternions_is_that_of_matrices() -> None:

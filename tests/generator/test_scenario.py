@@ -13,6 +13,8 @@ from mcap_landmarks_generator.loading import effective, load_scenario
 from mcap_landmarks_generator.scenario import ADAPTER, json_schema
 from mcap_landmarks_generator.toml_lines import lines_of
 
+from tests.generator.conftest import StageText
+
 GOOD = """\
 seed = 4
 objects = [
@@ -123,6 +125,18 @@ def test_a_bad_setting_is_wrong_usage(setting: str) -> None:
         load_scenario("small", [setting])
 
 
+def test_objects_appear_and_vanish_between_sessions_and_keep_their_ids(stage_text: StageText) -> None:
+    text = GOOD.replace("at = [3.0, 0.0] }", "at = [3.0, 0.0], sessions = [1] }").replace("[5.0, 2.0]", "[3.1, 0.1]")
+    text = text.replace("[robot]", "", 1).replace("start = [0.0, 0.0, 0.0]\n", "")
+    more = '  { class = "suitcase", at = [6.0, 2.0] },\n]'
+    text = text.replace("at = [3.1, 0.1] },\n]", f"at = [3.1, 0.1], sessions = [2, 3] }},\n{more}")
+    found = {n: [one.object_id for one in stage_text(f"session = {n}\n{text}").objects] for n in (1, 2)}
+    assert found == {1: ["fire_hydrant_1", "suitcase_2"], 2: ["suitcase_1", "suitcase_2"]}
+    both = text.replace("sessions = [2, 3]", "sessions = [1, 2]")
+    with pytest.raises(ToolkitError, match=r"scene\.toml:4: suitcase_1 stands inside fire_hydrant_1"):
+        stage_text(both)
+
+
 def test_an_unknown_name_gets_a_hint() -> None:
     with pytest.raises(UsageError, match="did you mean small"):
         load_scenario("smal")
@@ -137,7 +151,18 @@ def test_bundled_scenarios_can_be_run(name: str) -> None:
 
 
 def test_every_bundled_scenario_says_what_it_is_for() -> None:
-    assert set(bundled()) >= {"thesis_map", "thesis_localize", "loop", "small", "cluttered", "random"}
+    assert set(bundled()) >= {
+        "thesis_map",
+        "thesis_localize",
+        "loop",
+        "small",
+        "cluttered",
+        "random",
+        "street",
+        "campus",
+        "warehouse",
+        "seasons",
+    }
     assert all(len(text) > 20 for text in bundled().values())
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from mcap_landmarks_generator.assets import section
 from mcap_landmarks_generator.assets.asset import AssetClass, Variant
-from mcap_landmarks_generator.assets.section import Box, Section
+from mcap_landmarks_generator.assets.section import Box, Disc, Section
 from mcap_landmarks_generator.assets.shapes import box
 from mcap_landmarks_generator.assets.solid import Solid
 from mcap_landmarks_generator.assets.texture import Image, grey, hsv, pick, plain, rectangle, vivid, weathered, wooden
@@ -62,7 +62,7 @@ def paint(rng: np.random.Generator) -> dict[str, Image]:
     }
 
 
-def _posts(more: Sequence[Box] = ()) -> Section:
+def _posts(more: Sequence[Disc | Box] = ()) -> Section:
     x, y = (LENGTH_M - POST_M) / 2, (DEPTH_M - POST_M) / 2
     return Section((*more, *(Box(POST_M, POST_M, a * x, b * y) for a in (1, -1) for b in (1, -1))))
 
