@@ -1,7 +1,6 @@
 """Renders what the camera sees: which objects are in view, in front of ground and sky, with their masks."""
 
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Self
 
@@ -14,7 +13,7 @@ from mcap_landmarks_generator.assets.backdrop import Backdrop, Pinhole
 from mcap_landmarks_generator.assets.bullet import Body
 from mcap_landmarks_generator.assets.shadow import Shadow, cast_shadow
 from mcap_landmarks_generator.camera import Intrinsics, Viewpoint
-from mcap_landmarks_generator.drawing import NEAR_M, Drawing, Image, Window
+from mcap_landmarks_generator.drawing import NEAR_M, Drawing, Image, Window, bodies_of
 from mcap_landmarks_generator.layout import PlacedObject
 from mcap_landmarks_generator.scenario import Scenario
 
@@ -27,7 +26,7 @@ SHADOWS_TO_M = 12.0
 SUPERSAMPLING = 2
 """Objects are rendered this many times finer than the image, for smooth edges."""
 # Silhouettes of larger windows are rendered coarser.
-_SILHOUETTE_AREA_PX = 30_000
+_SILHOUETTE_AREA_PX = 7_500
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +55,7 @@ class Rendered:
 
 
 class Renderer:
-    """Draws one scenario's world from any place; a context manager that disconnects from PyBullet."""
+    """Draws one scenario's world from any place; a context manager."""
 
     def __init__(
         self,
@@ -69,14 +68,12 @@ class Renderer:
         self._far_m, self._shadows_to_m = far_m, shadows_to_m
         self._intrinsics = Intrinsics.of(scenario.camera)
         self._light = scenario.light
-        self._stack = ExitStack()
-        self._world = self._stack.enter_context(Drawing(self._intrinsics, self._light, 2 * far_m))
-        self._alone = self._stack.enter_context(Drawing(self._intrinsics, self._light, 2 * far_m))
+        self._drawing = Drawing(self._intrinsics, self._light)
         self._objects = objects
         self._centres = np.array([placed.route_xy[0] for placed in objects]).reshape(-1, 2)
         self._moving = np.array([placed.moves for placed in objects], dtype=bool)
         self._reach_m = np.array([placed.asset.footprint_radius_m for placed in objects])
-        self._corners = [_corners(placed) for placed in objects]
+        self._corners = [_corners(placed, 0.0) for placed in objects]
         self._backdrop = Backdrop(
             Pinhole.of(*self.size_px, self._intrinsics.focal_px),
             sky.panorama(scenario.background.kind, scenario.background.look),
@@ -89,7 +86,7 @@ class Renderer:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stack.close()
+        return None
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -99,20 +96,21 @@ class Renderer:
     def draw(self, view: Viewpoint) -> Rendered:
         """The image of a view."""
         in_view = self._in_view(view)
+        objects = [placed for placed, _ in in_view]
         image = self._backdrop.view(
             view.eye_m,
             view.world_from_optical,
-            self._shadows_in(view, [placed for placed, _ in in_view]),
+            self._shadows_in(view, objects),
             self._light.shade,
         )
-        bodies = self._world.show([placed for placed, _ in in_view], view.time_s)
+        bodies = bodies_of(objects)
         visible = tuple(
             _visible(view, placed, body, window) for (placed, window), body in zip(in_view, bodies, strict=True)
         )
         window = self._inner_window([one.window for one in visible])
         if window is None:
             return Rendered(image, np.full((0, 0), -1, np.int32), None, visible)
-        colours, body_ids = self._world.render(view, window, SUPERSAMPLING)
+        colours, body_ids = self._drawing.render(view, objects, window, SUPERSAMPLING)
         _lay_over(image, window, colours, body_ids >= 0)
         return Rendered(image, body_ids, window, visible)
 
@@ -124,41 +122,41 @@ class Renderer:
         """Mask (h, w) of these parts in the object's window, of a resolution of its own."""
         area_px = one.window.width * one.window.height
         scale = SUPERSAMPLING * min(1.0, float(np.sqrt(_SILHOUETTE_AREA_PX / area_px)))
-        (bodies,) = self._alone.show([one.placed], view.time_s)
-        _, body_ids = self._alone.render(view, one.window, scale)
-        return np.isin(body_ids, [body.body_id for body in bodies if body.labelled])
+        return self._drawing.mask(view, one.placed, one.window, scale)
 
     def _in_view(self, view: Viewpoint) -> list[tuple[PlacedObject, Window]]:
         """Objects within reach whose bounding box meets the image, with the window that holds the box."""
-        away = self._centres - view.eye_m[:2]
+        centres = self._centres.copy()
+        for i in np.flatnonzero(self._moving).tolist():
+            centres[i] = self._objects[i].pose_at(view.time_s)[:2]
+            self._corners[i] = _corners(self._objects[i], view.time_s)
+        away = centres - view.eye_m[:2]
         ahead = away @ view.world_from_optical[:2, 2] > -self._reach_m
-        near = np.hypot(away[:, 0], away[:, 1]) < self._far_m + self._reach_m
-        found = []
-        for i in np.flatnonzero((ahead & near) | self._moving).tolist():
-            placed = self._objects[i]
-            pose = placed.pose_at(view.time_s)
-            window = self._window(view, self._corners[i], pose)
-            if window is not None and np.hypot(*(pose[:2] - view.eye_m[:2])) < self._far_m:
-                found.append((placed, window))
-        return found
+        near = np.hypot(away[:, 0], away[:, 1]) < self._far_m
+        chosen = np.flatnonzero(ahead & near).tolist()
+        if not chosen:
+            return []
+        windows = self._windows(view, np.stack([self._corners[i] for i in chosen]))
+        found = zip(chosen, windows, strict=True)
+        return [(self._objects[i], window) for i, window in found if window is not None]
 
-    def _window(self, view: Viewpoint, corners: Floats, pose: Floats) -> Window | None:
-        """The window around an object's bounding box (8, 3) at a pose; None if it lies outside the image."""
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        world = corners @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + [pose[0], pose[1], 0.0]
-        local = (world - view.eye_m) @ view.world_from_optical
-        if local[:, 2].max() < NEAR_M:
-            return None
+    def _windows(self, view: Viewpoint, corners: Floats) -> list[Window | None]:
+        """The window around each bounding box (N, 8, 3) in the world; None if it lies outside the image."""
+        local = (corners - view.eye_m) @ view.world_from_optical
+        behind = local[..., 2].max(axis=1) < NEAR_M
         # Corners beside or behind the camera are drawn to its front: their direction sideways stays.
-        local[:, 2] = np.maximum(local[:, 2], NEAR_M)
-        pixels = self._intrinsics.project(local)
+        local[..., 2] = np.maximum(local[..., 2], NEAR_M)
+        pixels = self._intrinsics.project(local.reshape(-1, 3)).reshape(-1, 8, 2)
         width, height = self.size_px
-        (left, top), (right, bottom) = np.floor(pixels.min(axis=0)), np.ceil(pixels.max(axis=0)) + 1
         # An object beside the camera would need a window without end.
-        window = Window(
-            int(max(left, -width)), int(max(top, -height)), int(min(right, 2 * width)), int(min(bottom, 2 * height))
-        )
-        return window if window.meets(Window(0, 0, width, height)) else None
+        low = np.maximum(np.floor(pixels.min(axis=1)), [-width, -height]).astype(int)
+        high = np.minimum(np.ceil(pixels.max(axis=1)) + 1, [2 * width, 2 * height]).astype(int)
+        image = Window(0, 0, width, height)
+        windows = [Window(*sides) for sides in np.hstack([low, high]).tolist()]
+        return [
+            window if window.meets(image) and not hidden else None
+            for window, hidden in zip(windows, behind.tolist(), strict=True)
+        ]
 
     def _inner_window(self, windows: list[Window]) -> Window | None:
         """The part of the image that holds all windows."""
@@ -194,10 +192,13 @@ def _visible(view: Viewpoint, placed: PlacedObject, bodies: tuple[Body, ...], wi
     return Visible(placed, bodies, window, distance - reach, distance + reach)
 
 
-def _corners(placed: PlacedObject) -> Floats:
-    """Corners (8, 3) of an object's bounding box in its own frame."""
+def _corners(placed: PlacedObject, time_s: float) -> Floats:
+    """Corners (8, 3) of an object's bounding box, turned with it, in the world at a time."""
     low, high = placed.asset.bounds_m
-    return np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    x, y, heading = placed.pose_at(time_s)
+    c, s = np.cos(heading), np.sin(heading)
+    return np.asarray(corners @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + [x, y, 0.0])
 
 
 def _lay_over(image: Image, window: Window, colours: Image, covered: NDArray[np.bool_]) -> None:

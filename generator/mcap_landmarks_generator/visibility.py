@@ -32,12 +32,14 @@ def true_detections(rendered: Rendered, renderer: Drawn, view: Viewpoint, stamp_
     The share counts what other objects and the image's edges hide. Objects are left out that show less than 4 pixels.
     """
     names, options, boxes = [], [], []
+    owners = {body.body_id: one for one in rendered.visible for body in one.bodies}
     for one in rendered.visible:
         seen = _seen(rendered, one) if one.placed.asset.name in COCO_ID else None
         if seen is None:
             continue
         share = 1.0
-        beside = [other for other in rendered.visible if other is not one and seen.borders_on(other)]
+        # Whatever hides a part of an object borders on the rest of it.
+        beside = [owners[body_id] for body_id in seen.bodies_beside if owners.get(body_id, one) is not one]
         if _beyond_edge(one, renderer) or any(other.may_hide(one) for other in beside):
             share = min(1.0, seen.area_px / max(renderer.silhouette_px(view, one), seen.area_px))
         names.append(one.placed.object_id)
@@ -54,10 +56,6 @@ class _Seen:
     area_px: float
     bodies_beside: frozenset[int]
 
-    def borders_on(self, other: Visible) -> bool:
-        """Whether a body of the other object is right beside it; whatever hides a part of it borders on the rest."""
-        return any(body.body_id in self.bodies_beside for body in other.bodies)
-
 
 def _seen(rendered: Rendered, one: Visible) -> _Seen | None:
     """What an image shows of an object's labelled parts, None if hardly anything."""
@@ -70,14 +68,17 @@ def _seen(rendered: Rendered, one: Visible) -> _Seen | None:
         (top - inner.top) * SUPERSAMPLING : (one.window.bottom - inner.top) * SUPERSAMPLING,
         (left - inner.left) * SUPERSAMPLING : (one.window.right - inner.left) * SUPERSAMPLING,
     ]
-    mask = np.isin(part, [body.body_id for body in one.bodies if body.labelled])
-    area_px = int(mask.sum()) / SUPERSAMPLING**2
+    mask = np.zeros(part.shape, bool)
+    for body in one.bodies:
+        if body.labelled:
+            mask |= part == body.body_id
+    area_px = np.count_nonzero(mask) / SUPERSAMPLING**2
     if area_px < _LEAST_AREA_PX:
         return None
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     x = left + np.array([columns[0], columns[-1] + 1]) / SUPERSAMPLING
     y = top + np.array([rows[0], rows[-1] + 1]) / SUPERSAMPLING
-    border = cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8)).astype(bool) & ~mask
+    border = cv2.dilate(mask.view(np.uint8), np.ones((3, 3), np.uint8)).astype(bool) & ~mask
     beside = frozenset(np.unique(part[border]).tolist())
     return _Seen((float(x[0]), float(y[0]), float(x[1]), float(y[1])), area_px, beside)
 
