@@ -39,11 +39,11 @@ IMAGES: dict[Kind, int] = {"thesis": 1200, "twelve": 800, "empty": 800}
 
 
 class Detector:
-    """The bundled model, run as the stage runs it."""
+    """A model of the generator's training, run as the stage runs it."""
 
-    def __init__(self) -> None:
+    def __init__(self, path: Path) -> None:
         self._config = DetectConfig(confidence=LEAST_SCORE)
-        self._model = read_detector(open_session(resources.detector()), None, self._config)
+        self._model = read_detector(open_session(path), None, self._config)
         self.thresholds = self._model.confidence
         self._shipped = np.array([self.thresholds.get(name, 1.0) for name in self._model.names])
         self._above = thresholds(self._model, self._config)
@@ -62,7 +62,7 @@ class Detector:
 
 def measure(quick: bool) -> Iterator[Row]:
     """The rows of step 3 about what is found; worlds, looks and places that no training saw."""
-    detector = Detector()
+    detector = Detector(resources.detector())
     results: dict[Kind, tuple[list[Found], list[Picture]]] = {}
     for kind, images in IMAGES.items():
         shown = list(_worlds(kind, images // 8 if quick else images))
