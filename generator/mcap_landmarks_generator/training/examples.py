@@ -17,9 +17,11 @@ Rng = np.random.Generator
 CLASS_IDS = np.array(sorted(COCO_ID.values()))
 """COCO ids of the classes, in the order of the network's outputs."""
 
-_PADDING = (114, 114, 114)
+_PADDING = (114, 114, 114, 0)
 _SCALE = (0.55, 1.5)
 _FOCUSED = 0.75
+# Share of examples that are nothing but painted, and of the others whose objects stand before something painted.
+_PAINTED, _BEFORE_PAINTED = 0.2, 0.4
 _NOISE_MARGIN_PX = 64
 # Less than this of an object in the example, or smaller: not to be learned.
 _LEAST_SHARE, _LEAST_SIDE_PX = 0.2, 3.0
@@ -67,14 +69,39 @@ class Examples:
         rng = np.random.default_rng([self._seed, step])
         images = np.empty((phase.batch, phase.height_px, phase.width_px, 3), np.uint8)
         targets = []
-        for row, index in enumerate(rng.integers(len(self._pictures), size=phase.batch)):
-            image, labels = self._pictures.image(index), self._pictures.labels[index]
-            matrix = _window((image.shape[0], image.shape[1]), labels, phase, rng)
-            cut = cv2.warpAffine(image, matrix, (phase.width_px, phase.height_px), borderValue=_PADDING)
-            images[row] = photographed(np.asarray(cut, np.uint8), rng)
-            rows = _targets(labels, matrix, phase)
+        for row in range(phase.batch):
+            images[row], rows = self._example(phase, rng)
             targets.append(np.column_stack([np.full(len(rows), row), rows]))
         return Batch(images, np.concatenate(targets).astype(np.float32))
+
+    def _example(self, phase: Phase, rng: Rng) -> tuple[Image, Floats]:
+        """An image (H, W, 3), and class index, centre and size (N, 5) of what it shows."""
+        pictures = self._pictures
+        if pictures.painted and rng.random() < _PAINTED:
+            return photographed(self._painted(phase, rng), rng), np.zeros((0, 5))
+        index = pictures.rendered[rng.integers(len(pictures.rendered))]
+        image, labels = pictures.image(index), pictures.labels[index]
+        matrix = _window((image.shape[0], image.shape[1]), labels, phase, rng)
+        cut = cv2.warpAffine(image, matrix, (phase.width_px, phase.height_px), borderValue=_PADDING)
+        shown = np.asarray(cut[..., :3], np.uint8)
+        if pictures.painted and rng.random() < _BEFORE_PAINTED:
+            shown = _before(shown, np.asarray(cut[..., 3], np.uint8), self._painted(phase, rng))
+        return photographed(shown, rng), _targets(labels, matrix, phase)
+
+    def _painted(self, phase: Phase, rng: Rng) -> Image:
+        """A window (H, W, 3) of a painted picture, which goes on beyond its edges as in a mirror."""
+        index = self._pictures.painted[rng.integers(len(self._pictures.painted))]
+        image = self._pictures.image(index)[..., :3]
+        nothing = self._pictures.labels[index]
+        matrix = _window((image.shape[0], image.shape[1]), nothing, phase, rng)
+        size = (phase.width_px, phase.height_px)
+        return np.asarray(cv2.warpAffine(image, matrix, size, borderMode=cv2.BORDER_REFLECT_101), np.uint8)
+
+
+def _before(image: Image, cover: Image, behind: Image) -> Image:
+    """What covers an image (H, W, 3), before something else."""
+    share = cover[..., None].astype(np.uint16)
+    return np.asarray((image * share + behind * (255 - share) + 127) // 255, np.uint8)
 
 
 def _window(image_px: tuple[int, int], labels: Labels, phase: Phase, rng: Rng) -> Floats:
@@ -138,10 +165,12 @@ def _noise(height_px: int, width_px: int) -> NDArray[np.float32]:
 
 
 def _recoloured(image: Image, rng: Rng) -> Image:
-    """Hue, saturation and brightness by random factors."""
+    """Hue, saturation and brightness by random factors, and at times more contrast or less."""
     hue, saturation, value = 1 + rng.uniform(-1, 1, 3) * (0.03, 0.6, 0.4)
+    power = float(np.exp(rng.normal(0, 0.3))) if rng.random() < 0.5 else 1.0
     level = np.arange(256, dtype=np.float32)
-    tables = [(level * hue) % 180, np.clip(level * saturation, 0, 255), np.clip(level * value, 0, 255)]
+    bright = 255 * np.clip(level / 255 * value, 0, 1) ** power
+    tables = [(level * hue) % 180, np.clip(level * saturation, 0, 255), bright]
     planes = cv2.split(cv2.cvtColor(image, cv2.COLOR_RGB2HSV))
     changed = [cv2.LUT(plane, table.astype(np.uint8)) for plane, table in zip(planes, tables, strict=True)]
     return np.asarray(cv2.cvtColor(cv2.merge(changed), cv2.COLOR_HSV2RGB), np.uint8)

@@ -23,7 +23,7 @@ def detect(network: Network, images: Sequence[Image]) -> list[Found]:
     for first in range(0, len(images), _BATCH):
         array = torch.from_numpy(np.stack(images[first : first + _BATCH])).to(device).permute(0, 3, 1, 2)
         inputs = (array.float() / 255).contiguous(memory_format=torch.channels_last)
-        with torch.autocast(device.type, torch.bfloat16):
+        with torch.autocast(device.type, torch.bfloat16, enabled=device.type != "cpu"):
             raw = network(inputs)
         rows = network.decode([out.float() for out in raw]).cpu().numpy()
         found += [_found(row) for row in rows]

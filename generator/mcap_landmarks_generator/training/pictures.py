@@ -7,20 +7,26 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks_generator.assets.catalog import COCO_ID
 from mcap_landmarks_generator.camera import Intrinsics
 from mcap_landmarks_generator.optics import Optics
-from mcap_landmarks_generator.renderer import Renderer
+from mcap_landmarks_generator.renderer import Rendered, Renderer
+from mcap_landmarks_generator.training import clutter
 from mcap_landmarks_generator.training.worlds import Recipe, Scene, scene
 from mcap_landmarks_generator.visibility import true_detections
 
 Image = NDArray[np.uint8]
 
 SHARD_SCENES = 16
+PAINTED = "painted"
+"""What the names of shards of painted pictures begin with."""
 _INDEX = "set.json"
+_PER_SCENE = 8
+_NOTHING = (np.zeros(0, np.int64), np.zeros((0, 4)), np.zeros(0), np.zeros(0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,9 +41,13 @@ class Labels:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """An image (H, W, 3) in RGB with its labels, and the bearings (M,) of the objects' centres, left is positive."""
+    """An image (H, W, 3) in RGB with its labels, and the bearings (M,) of the objects' centres, left is positive.
+
+    `cover` (H, W) tells by 0 to 255 how much of each pixel objects cover; the rest is ground and sky.
+    """
 
     image: Image
+    cover: Image
     labels: Labels
     bearings_rad: NDArray[np.float64]
 
@@ -61,17 +71,40 @@ def render(one: Scene, exposed: bool) -> Iterator[Picture]:
             image = rendered.image
             ahead = away @ view.world_from_optical[:2, [0, 2]]
             bearings_rad = np.arctan2(-ahead[:, 0], ahead[:, 1])
-            yield Picture(
-                optics.developed(optics.expose(image, index, 0.0)) if exposed else image, labels, bearings_rad
-            )
+            if exposed:
+                image = optics.developed(optics.expose(image, index, 0.0))
+            yield Picture(image, _cover(rendered), labels, bearings_rad)
 
 
-def make(folder: Path, recipes: Sequence[tuple[Recipe, int]], seed: int, workers: int = 1) -> Iterator[int]:
+def painted(seed: int, index: int) -> Picture:
+    """A painted picture of nothing that is looked for; none of it is covered."""
+    image = clutter.paint(seed, index)
+    return Picture(image, np.zeros(image.shape[:2], np.uint8), Labels(*_NOTHING), np.zeros(0))
+
+
+def _cover(rendered: Rendered) -> Image:
+    cover = np.zeros(rendered.image.shape[:2], np.uint8)
+    window = rendered.window
+    if window is not None:
+        mask = np.where(rendered.body_ids >= 0, np.uint8(255), np.uint8(0))
+        finer = cv2.resize(mask, (window.width, window.height), interpolation=cv2.INTER_AREA)
+        cover[window.top : window.bottom, window.left : window.right] = finer
+    return cover
+
+
+def make(
+    folder: Path, recipes: Sequence[tuple[Recipe, int]], seed: int, workers: int = 1, painted_scenes: int = 0
+) -> Iterator[int]:
     """Render so many scenes of each recipe into a folder, shard by shard; yields how many scenes are there.
 
-    Shards that are there already are kept: an interrupted call goes on where it was.
+    `painted_scenes` come beside them, each of as many painted pictures of nothing as a scene has views. Shards that are
+    there already are kept: an interrupted call goes on where it was.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    kinds: list[tuple[str, Recipe | None, int]] = [
+        (str(kind), recipe, scenes) for kind, (recipe, scenes) in enumerate(recipes)
+    ]
+    kinds.append((PAINTED, None, painted_scenes))
     jobs = [
         (
             folder / f"{kind}{first // SHARD_SCENES:03d}.npz",
@@ -79,7 +112,7 @@ def make(folder: Path, recipes: Sequence[tuple[Recipe, int]], seed: int, workers
             seed,
             range(first, min(first + SHARD_SCENES, scenes)),
         )
-        for kind, (recipe, scenes) in enumerate(recipes)
+        for kind, recipe, scenes in kinds
         for first in range(0, scenes, SHARD_SCENES)
     ]
     done = sum(len(job[3]) for job in jobs if job[0].exists())
@@ -90,21 +123,25 @@ def make(folder: Path, recipes: Sequence[tuple[Recipe, int]], seed: int, workers
             yield done
     about = {
         "seed": seed,
-        "scenes": [scenes for _, scenes in recipes],
+        "scenes": [scenes for _, _, scenes in kinds],
         "sha256": _digest(sorted(folder.glob("*.np[yz]"))),
     }
     (folder / _INDEX).write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
 
 
-def _make_shard(job: tuple[Path, Recipe, int, range]) -> int:
+def _make_shard(job: tuple[Path, Recipe | None, int, range]) -> int:
     target, recipe, seed, indices = job
-    _save(target, [picture for index in indices for picture in render(scene(recipe, seed, index), exposed=False)])
+    if recipe is None:
+        numbers = range(indices.start * _PER_SCENE, indices.stop * _PER_SCENE)
+        _save(target, [painted(seed, number) for number in numbers])
+    else:
+        _save(target, [picture for index in indices for picture in render(scene(recipe, seed, index), exposed=False)])
     return len(indices)
 
 
 def _save(target: Path, pictures: list[Picture]) -> None:
     images = target.with_suffix(".npy")
-    np.save(images, np.stack([picture.image for picture in pictures]))
+    np.save(images, np.stack([np.dstack([picture.image, picture.cover]) for picture in pictures]))
     labels = [picture.labels for picture in pictures]
     partial = target.with_suffix(".part")
     with partial.open("wb") as file:
@@ -140,12 +177,17 @@ class PictureSet:
         self._images: list[Image] = []
         self.labels: list[Labels] = []
         self._place: list[tuple[int, int]] = []
+        self.painted: list[int] = []
+        """The numbers of those that are painted, and of the others."""
+        self.rendered: list[int] = []
         for shard, file in enumerate(sorted(folder.glob("*.npz"))):
             self._images.append(np.load(file.with_suffix(".npy"), mmap_mode="r"))
             with np.load(file) as data:
                 ends = np.cumsum(data["counts"])[:-1]
                 columns = [np.split(data[name], ends) for name in ("classes", "boxes_xyxy", "shares", "distances_m")]
             self.labels += [Labels(*row) for row in zip(*columns, strict=True)]
+            numbers = range(len(self._place), len(self._place) + len(columns[0]))
+            (self.painted if file.name.startswith(PAINTED) else self.rendered).extend(numbers)
             self._place += [(shard, row) for row in range(len(columns[0]))]
 
     def __reduce__(self) -> tuple[type["PictureSet"], tuple[Path]]:
@@ -156,6 +198,6 @@ class PictureSet:
         return len(self.labels)
 
     def image(self, index: int) -> Image:
-        """One image (H, W, 3) in RGB, not to be written to."""
+        """One image (H, W, 4): RGB, and how much of each pixel is covered; not to be written to."""
         shard, row = self._place[index]
         return np.asarray(self._images[shard][row])

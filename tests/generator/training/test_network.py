@@ -12,7 +12,7 @@ from mcap_landmarks.coco import NAMES  # noqa: E402
 from mcap_landmarks.vision.config import DetectConfig  # noqa: E402
 from mcap_landmarks.vision.detector import read_detector  # noqa: E402
 from mcap_landmarks.vision.onnx_session import open_session  # noqa: E402
-from mcap_landmarks_generator.training import fitting  # noqa: E402
+from mcap_landmarks_generator.training import exported, fitting  # noqa: E402
 from mcap_landmarks_generator.training.examples import CLASS_IDS, Batch, Phase  # noqa: E402
 from mcap_landmarks_generator.training.export import export, fused, with_all_classes  # noqa: E402
 from mcap_landmarks_generator.training.loss import complete_iou, loss  # noqa: E402
@@ -122,6 +122,33 @@ def test_an_export_says_what_the_network_says_under_cocos_names(tmp_path: Path) 
     assert np.abs(rows[..., 5 + CLASS_IDS] - wanted[..., 5:]).max() < 1e-5
     assert np.delete(rows[..., 5:], CLASS_IDS, axis=2).max() < 1e-6
     assert with_all_classes(fused(network)).numbers == 85
+
+
+class _Noise:
+    """Examples of noise, brighter from step to step."""
+
+    def __len__(self) -> int:
+        return 3
+
+    def __getitem__(self, step: int) -> Batch:
+        images = np.random.default_rng(step).integers(0, 80 * (step + 1), (4, 64, 64, 3), dtype=np.uint8)
+        return Batch(images, np.zeros((0, 6), np.float32))
+
+
+def test_an_export_read_back_says_the_same_and_goes_on_from_there(tmp_path: Path) -> None:
+    network, path, image = _trained_a_little(), tmp_path / "model.onnx", torch.rand(1, 3, 64, 96)
+    export(network, path, None, {})
+    again = exported.read(path)
+    with torch.no_grad():
+        wanted = network(image)
+        for given, known in zip(again(image), wanted, strict=True):
+            assert torch.allclose(given, known, atol=1e-4)
+        exported.calibrate(again, _Noise())  # type: ignore[arg-type]
+        for given, known in zip(again(image), wanted, strict=True):
+            assert torch.allclose(given, known, atol=1e-4)
+    first, last = again.to_p3[0], again.out_p5.join
+    assert first.norm.running_var.max() < 0.5  # type: ignore[union-attr]
+    assert last.norm.running_var.std() > 0  # type: ignore[union-attr, operator]
 
 
 class _TwoSteps:
