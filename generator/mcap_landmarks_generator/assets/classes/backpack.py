@@ -6,7 +6,7 @@ from mcap_landmarks_generator.assets.asset import AssetClass, Variant
 from mcap_landmarks_generator.assets.section import Box, Section
 from mcap_landmarks_generator.assets.shapes import limb, rounded_box, rounded_rectangle, stack
 from mcap_landmarks_generator.assets.solid import Solid
-from mcap_landmarks_generator.assets.texture import Image, grey, hsv, pick, plain, vivid
+from mcap_landmarks_generator.assets.texture import Colour, Image, grey, hsv, noise, pick, plain, stroke, to_image, vivid
 
 # The bag, two layers of pockets in front of it, and the side pockets: upright up to TOP_M, above the LiDAR's band.
 BAG = Box(0.19, 0.33, x_m=-0.045, corner_m=0.06)
@@ -76,16 +76,27 @@ def _straps(height: float) -> list[Solid]:
 
 
 def paint(rng: np.random.Generator) -> dict[str, Image]:
-    """Two tones of cloth, dark zips and straps."""
-    dark = pick(rng, (grey(rng, 0.1, 0.3), hsv(0.61, rng.uniform(0.3, 0.7), rng.uniform(0.2, 0.4))))
-    cloth = pick(rng, (vivid(rng, 0.25, 0.8), dark, dark))
-    pouch = pick(rng, (0.75 * cloth, 1.2 * cloth, vivid(rng, 0.3, 0.8)))
+    """Cloth in one dark colour with folds, light zips, and black straps."""
+    dark = pick(rng, (grey(rng, 0.12, 0.25), grey(rng, 0.12, 0.25), hsv(0.61, rng.uniform(0.4, 0.7), 0.3)))
+    colour = pick(rng, (dark, dark, dark, hsv(rng.uniform(-0.02, 0.02), 0.8, 0.5), hsv(0.25, 0.4, 0.35)))
     return {
-        "bag": plain(rng, cloth, 64, mottle=0.18),
-        "pouch": plain(rng, pouch, 64, mottle=0.15),
+        "bag": _creased(rng, colour, grey(rng, 0.3, 0.5)),
+        "pouch": _creased(rng, 0.85 * colour, grey(rng, 0.3, 0.5)),
         "badge": plain(rng, pick(rng, (grey(rng, 0.7, 0.95), vivid(rng)))),
-        "strap": plain(rng, grey(rng, 0.05, 0.16)),
+        "strap": plain(rng, grey(rng, 0.05, 0.12)),
     }
+
+
+def _creased(rng: np.random.Generator, colour: Colour, zip_colour: Colour) -> Image:
+    """Cloth that hangs in folds, lighter towards the top, with the line of a zip around it."""
+    size_px = 128
+    v = 1 - (np.arange(size_px) + 0.5) / size_px
+    folds = 1 + 0.7 * (noise(rng, size_px, size_px, octaves=5, cells=4) - 0.5)
+    lit = np.interp(v, [0.0, 0.2, 0.7, 1.0], [0.6, 0.9, 1.1, 1.5])
+    image = to_image(colour * (folds * lit[:, None])[..., None])
+    stroke(image, [(0.0, 0.55), (1.0, 0.55)], 0.016, 0.4 * colour)
+    stroke(image, [(0.0, 0.53), (1.0, 0.53)], 0.008, zip_colour)
+    return image
 
 
 CLASS = AssetClass("backpack", 24, {"standard": Variant(Section((BAG, FRONT, POUCH, *SIDES)), shape, paint)})

@@ -26,18 +26,19 @@ def shape(rng: np.random.Generator) -> list[Solid]:
         up = 0.06 + height * (index + 0.5)
         board = box(0.028, length, 0.8 * height, "wood").turned((0, 1, 0), -lean)
         solids.append(board.moved(-0.2 - up * np.tan(lean), z_m=SEAT_M + up))
-    arms = rng.random() < 0.6
+    arms = rng.random() < 0.8
     for side in (1, -1):
         solids += [solid.moved(y_m=side * FRAME_Y_M) for solid in _frame(lean, arms)]
     return solids
 
 
 def _frame(lean: float, arms: bool) -> list[Solid]:
-    """One end frame: a foot that carries the seat, the post of the back, and an armrest."""
+    """One end frame: a foot with two legs that carry the seat, the post of the back, and an armrest."""
     back = [(-0.19, 0, SEAT_M - 0.03), (-0.23 - 0.44 * np.tan(lean), 0, SEAT_M + 0.44)]
     solids = [
-        box(FRAME_LENGTH_M, FRAME_WIDTH_M, 0.25, "frame").moved(z_m=0.125),
-        box(FRAME_LENGTH_M * 0.8, FRAME_WIDTH_M * 0.8, SEAT_M - 0.26, "frame").moved(z_m=0.24 + (SEAT_M - 0.26) / 2),
+        box(FRAME_LENGTH_M, FRAME_WIDTH_M, 0.21, "frame").moved(z_m=0.105),
+        limb([(0.15, 0, 0.2), (0.17, 0, SEAT_M - 0.02)], 0.026, "frame", 6),
+        limb([(-0.15, 0, 0.2), (-0.18, 0, SEAT_M - 0.02)], 0.026, "frame", 6),
         limb(back, 0.026, "frame", 6),
     ]
     if arms:
@@ -51,11 +52,11 @@ def _frame(lean: float, arms: bool) -> list[Solid]:
 def paint(rng: np.random.Generator) -> dict[str, Image]:
     """Wood, or green paint, on iron or stone."""
     wood = hsv(rng.uniform(0.05, 0.1), rng.uniform(0.4, 0.75), rng.uniform(0.35, 0.75))
-    boards = pick(rng, (wood, wood, wood, hsv(0.36, 0.5, 0.35), grey(rng, 0.4, 0.6)))
+    boards = pick(rng, (wood, wood, wood, wood, wood, hsv(0.36, 0.5, 0.35)))
     # The grain runs along the bench, which is the texture's u on the faces that matter.
     return {
         "wood": wooden(rng, boards, 64, grain=3),
-        "frame": plain(rng, pick(rng, (grey(rng, 0.06, 0.25), grey(rng, 0.5, 0.75), hsv(0.36, 0.5, 0.25)))),
+        "frame": plain(rng, pick(rng, (grey(rng, 0.06, 0.25), grey(rng, 0.06, 0.25), hsv(0.36, 0.5, 0.25)))),
     }
 
 

@@ -19,6 +19,7 @@ from mcap_landmarks_generator.assets.texture import (
     plain,
     polygon,
     rectangle,
+    stroke,
     to_image,
     weathered,
 )
@@ -31,7 +32,8 @@ CORNERS_U = np.array([0.0, 0.03, 0.06, 0.15, 0.22, 0.26, 0.345, 0.43, 0.47, 0.5]
 WAIST_U, ROOF_U = CORNERS_U[5], CORNERS_U[7]
 # Heights of the corners 1 to 5 where the body is highest, to paint by.
 SIDE_M = (FLOOR_M, 0.22, 0.55, 0.82, 0.90)
-GLASS, DARK, HEADLIGHT, TAIL_LIGHT = (36, 44, 50), (22, 22, 24), (238, 240, 236), (190, 20, 22)
+GLASS, DARK, HEADLIGHT, TAIL_LIGHT = (24, 30, 34), (18, 18, 20), (238, 240, 236), (190, 20, 22)
+LAMP_HOUSING = (52, 55, 60)
 SKY = np.array([165.0, 185.0, 200.0])
 
 
@@ -147,7 +149,7 @@ def _painted_body(outline: Outline, colour: Floats) -> Image:
         outline.rear_top_m,
         outline.rear_foot_m,
     )
-    seam = 0.7 * colour
+    seam = 0.5 * colour
     post = 0.5 * (top + rear_top) + 0.12
     rectangle(right, (0.0, 0.0), (_u(0.23), 1.0), DARK)
     for x in AXLES_M:
@@ -170,7 +172,9 @@ def _painted_body(outline: Outline, colour: Floats) -> Image:
         ],
     ):
         polygon(right, [(u, _v(x)) for u, x in corners], GLASS)
-    polygon(right, [(_u(0.60), _v(1.82)), (_u(0.60), 1.0), (_u(0.84), 1.0), (_u(0.74), _v(1.80))], HEADLIGHT)
+    lamp = np.array([(_u(0.60), _v(1.84)), (_u(0.60), 1.0), (_u(0.80), 1.0), (_u(0.72), _v(1.82))])
+    polygon(right, lamp, LAMP_HOUSING)
+    polygon(right, lamp.mean(axis=0) + 0.6 * (lamp - lamp.mean(axis=0)), HEADLIGHT)
     rectangle(right, (_u(0.70), 0.0), (_u(0.90), _v(-1.92)), TAIL_LIGHT)
     return np.concatenate([right[:, :128], right[:, 127::-1]], axis=1)
 
@@ -186,15 +190,21 @@ def _v(x_m: float) -> float:
 
 
 def _front(colour: Floats) -> Image:
-    """Slanted headlights, a grille, a number plate and an air intake."""
-    image = canvas(0.8 * colour, 64, 128)
-    rectangle(image, (0.0, 0.0), (1.0, 0.12), DARK)
-    polygon(image, [(0.30, 0.60), (0.70, 0.60), (0.74, 0.78), (0.26, 0.78)], DARK)
-    polygon(image, [(0.16, 0.12), (0.84, 0.12), (0.76, 0.34), (0.24, 0.34)], DARK)
-    rectangle(image, (0.38, 0.30), (0.62, 0.44), (235, 235, 225))
+    """Headlights in dark housings, a barred grille with a badge, a number plate, an air intake and fog lamps."""
+    image = canvas(0.85 * colour, 64, 128)
+    rectangle(image, (0.0, 0.0), (1.0, 0.14), DARK)
+    grille = [(0.27, 0.56), (0.73, 0.56), (0.77, 0.82), (0.23, 0.82)]
+    polygon(image, grille, DARK)
+    for bar in (0.62, 0.69, 0.76):
+        rectangle(image, (0.28, bar - 0.01), (0.72, bar + 0.01), (105, 108, 112))
+    ellipse(image, (0.5, 0.69), (0.035, 0.07), (200, 203, 206))
+    polygon(image, [(0.14, 0.14), (0.86, 0.14), (0.78, 0.34), (0.22, 0.34)], DARK)
+    rectangle(image, (0.38, 0.36), (0.62, 0.50), (235, 235, 225))
     for flip in (False, True):
-        corners = np.array([(0.0, 0.60), (0.16, 0.56), (0.21, 0.70), (0.0, 0.80)])
-        polygon(image, np.abs(corners - (float(flip), 0.0)), HEADLIGHT)
+        corners = np.array([(0.0, 0.56), (0.17, 0.56), (0.21, 0.72), (0.0, 0.84)])
+        polygon(image, np.abs(corners - (float(flip), 0.0)), LAMP_HOUSING)
+        ellipse(image, (abs(0.09 - float(flip)), 0.67), (0.05, 0.09), HEADLIGHT)
+        ellipse(image, (abs(0.10 - float(flip)), 0.26), (0.03, 0.06), (150, 152, 150))
     return image
 
 
@@ -210,12 +220,14 @@ def _rear(colour: Floats) -> Image:
 
 
 def _painted_wheel(metal: Floats) -> Image:
-    """A tyre around a rim with five openings."""
-    image = canvas((24, 24, 25), 64, 64)
-    ellipse(image, (0.5, 0.5), (0.34, 0.34), metal)
+    """A tyre around a rim with five spokes."""
+    image = canvas((20, 20, 21), 64, 64)
+    ellipse(image, (0.5, 0.5), (0.33, 0.33), metal)
+    ellipse(image, (0.5, 0.5), (0.28, 0.28), (40, 40, 42))
     for turn in range(5):
         angle = 2 * np.pi * turn / 5
-        ellipse(image, (0.5 + 0.2 * np.cos(angle), 0.5 + 0.2 * np.sin(angle)), (0.06, 0.06), (60, 60, 62))
+        stroke(image, [(0.5, 0.5), (0.5 + 0.29 * np.cos(angle), 0.5 + 0.29 * np.sin(angle))], 0.09, metal)
+    ellipse(image, (0.5, 0.5), (0.05, 0.05), 0.6 * metal)
     return image
 
 

@@ -21,7 +21,7 @@ def shape(rng: np.random.Generator) -> list[Solid]:
             solids.append(leg.moved(x * LENGTH_M / 2, y * WIDTH_M / 2))
         rail = [(x * LENGTH_M / 2, -WIDTH_M / 2, 0.28), (x * LENGTH_M / 2, WIDTH_M / 2, 0.28)]
         solids.append(limb(rail, 0.013, "frame", 6))
-    if rng.random() < 0.5:
+    if rng.random() < 0.25:
         solids += _arms(seat)
     return solids + _back(rng, seat, back)
 
@@ -42,11 +42,11 @@ def _back(rng: np.random.Generator, seat: float, back: float) -> list[Solid]:
     for y in (1, -1):
         post = [(-LENGTH_M / 2, y * WIDTH_M / 2, 0.0), (-LENGTH_M / 2 - back * lean, y * WIDTH_M / 2, back)]
         solids.append(limb(post, 0.020, "frame", 8).moved(z_m=seat))
-    kind = rng.integers(3)
+    kind = rng.choice(3, p=[0.15, 0.75, 0.1])
     if kind == 0:
         parts = [(0.03, 0.36, back * 0.17, share) for share in (0.3, 0.6, 0.9)]
     elif kind == 1:
-        parts = [(0.03, 0.40, back * 0.62, 0.66)]
+        parts = [(0.035, 0.42, back * 0.62, 0.66)]
     else:
         parts = [(0.03, 0.40, back * 0.16, 0.92)]
         for offset in (-0.12, -0.04, 0.04, 0.12):

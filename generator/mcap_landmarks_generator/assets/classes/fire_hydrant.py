@@ -53,11 +53,11 @@ def _nozzle(radius: float, height: float, heading: float) -> list[Solid]:
 
 
 def paint(rng: np.random.Generator) -> dict[str, Image]:
-    """Mostly red or yellow, caps often in another colour."""
+    """Mostly red or yellow all over; bonnet and caps at times a little darker, or silver."""
     red = hsv(rng.uniform(-0.02, 0.02), rng.uniform(0.8, 1), rng.uniform(0.6, 0.95))
     yellow = hsv(rng.uniform(0.12, 0.16), rng.uniform(0.8, 1), rng.uniform(0.75, 1))
-    body = pick(rng, (red, red, red, yellow, yellow, grey(rng, 0.65, 0.95), hsv(rng.uniform(0.56, 0.62), 0.75, 0.7)))
-    cap = pick(rng, (body, body, 0.85 * body, grey(rng, 0.65, 0.95), yellow, hsv(0.6, 0.8, 0.65), hsv(0.35, 0.7, 0.5)))
+    body = pick(rng, (red, red, red, red, red, yellow, yellow, yellow, yellow, grey(rng, 0.85, 0.97)))
+    cap = pick(rng, (body, body, body, 0.85 * body, 0.85 * body, grey(rng, 0.65, 0.95)))
     return {
         "body": plain(rng, body, 64),
         "cap": plain(rng, cap),

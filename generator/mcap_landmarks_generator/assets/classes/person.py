@@ -10,7 +10,21 @@ from mcap_landmarks_generator.assets.asset import AssetClass, Variant
 from mcap_landmarks_generator.assets.section import Disc, Section
 from mcap_landmarks_generator.assets.shapes import circle, ellipsoid, limb, stack
 from mcap_landmarks_generator.assets.solid import Floats, Solid, vector
-from mcap_landmarks_generator.assets.texture import Image, cloth, grey, hsv, pick, plain, vivid
+from mcap_landmarks_generator.assets.texture import (
+    Colour,
+    Image,
+    cloth,
+    ellipse,
+    grey,
+    hsv,
+    noise,
+    pick,
+    plain,
+    rectangle,
+    to_image,
+    vivid,
+    weathered,
+)
 
 # Height, depth and width (radii) of a body of 1.75 m in a shirt and in a coat.
 SHIRT_LEVELS = (
@@ -138,18 +152,32 @@ def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
     denim = hsv(0.61, rng.uniform(0.3, 0.7), rng.uniform(0.2, 0.6))
     top = pick(rng, (vivid(rng), muted, grey(rng, 0.08, 0.95)))
     trousers = pick(rng, (denim, denim, grey(rng, 0.08, 0.5), hsv(0.1, 0.4, rng.uniform(0.3, 0.7)), muted))
-    coat = plain(
-        rng, pick(rng, (muted, grey(rng, 0.07, 0.45), hsv(0.09, 0.45, rng.uniform(0.35, 0.7)), vivid(rng))), 64
+    coat = pick(
+        rng, (muted, muted, grey(rng, 0.07, 0.45), hsv(0.61, 0.6, rng.uniform(0.2, 0.5)), vivid(rng), top)
     )
     hair = (grey(rng, 0.04, 0.18), hsv(0.07, 0.6, rng.uniform(0.2, 0.4)), hsv(0.12, 0.5, 0.75), grey(rng, 0.5, 0.8))
     return {
-        "top": coat if variant == "coat" else cloth(rng, top),
+        "top": _coat_cloth(rng, coat) if variant == "coat" else cloth(rng, top),
         "trousers": plain(rng, trousers),
         "shoes": plain(rng, pick(rng, (grey(rng, 0.05, 0.3), hsv(0.06, 0.5, 0.3), grey(rng, 0.7, 0.95)))),
         "skin": plain(rng, skin, mottle=0.05),
         "hair": plain(rng, pick(rng, hair), mottle=0.25),
         "eyes": plain(rng, (35, 28, 26)),
     }
+
+
+def _coat_cloth(rng: np.random.Generator, colour: Colour) -> Image:
+    """A coat's cloth: folds that deepen towards the hem, the dark line of its opening, and buttons beside it."""
+    size_px = 64
+    u = (np.arange(size_px) + 0.5) / size_px
+    v = 1 - u
+    waves = np.sin(2 * np.pi * (int(rng.integers(7, 11)) * u + rng.random())) * (0.6 + 0.4 * noise(rng, 1, size_px)[0])
+    depth = np.interp(v, [0.0, 0.1, 0.6, 1.0], [0.05, 0.3, 0.08, 0.05])
+    image = to_image(colour * (1 + depth[:, None] * waves[None, :])[..., None])
+    rectangle(image, (0.0, 0.05), (0.02, 0.95), 0.5 * colour)
+    for height in (0.55, 0.63, 0.71, 0.79):
+        ellipse(image, (0.05, height), (0.012, 0.012), 0.3 * colour)
+    return weathered(rng, image, 0.1)
 
 
 VARIANTS = {name: Variant(SECTIONS[name], partial(shape, name), partial(paint, name)) for name in SECTIONS}

@@ -36,7 +36,7 @@ def _leaf(rng: np.random.Generator, length: float, tilt: float, material: str) -
     step = length / (len(along) - 1)
     x = np.concatenate([[0.0], np.cumsum(np.sin(angle[:-1]) * step)]) + 0.02
     z = np.concatenate([[0.0], np.cumsum(np.cos(angle[:-1]) * step)])
-    half = length * rng.uniform(0.08, 0.14) * np.sin(np.pi * (0.1 + 0.9 * along)) ** 0.8
+    half = length * rng.uniform(0.10, 0.18) * np.sin(np.pi * (0.1 + 0.9 * along)) ** 0.8
     points = np.empty((len(along), 3, 3))
     for index, side in enumerate((-1.0, 0.0, 1.0)):
         points[:, index] = np.column_stack(

@@ -12,6 +12,8 @@ BALL_M = 0.15
 # The slice at LiDAR height is hardly smaller than the equator, which lies in the middle of the band.
 SECTION_M = 0.148
 HEIGHT_PX, WIDTH_PX = 128, 256
+# How far a truncated icosahedron's pentagons are from its middle, as a share of its hexagons' distance: 2.327 / 2.267.
+PENTAGON_TO_HEXAGON = 1.0265
 
 
 def shape(rng: np.random.Generator) -> list[Solid]:
@@ -37,17 +39,28 @@ def paint(rng: np.random.Generator) -> dict[str, Image]:
 
 
 def _football(rng: np.random.Generator, points: Floats) -> Floats:
-    """Twelve dark pentagons at an icosahedron's corners, with seams to their neighbours."""
+    """A truncated icosahedron: twelve dark pentagons, twenty white hexagons, and the seams between them."""
     golden = (1 + np.sqrt(5)) / 2
-    pairs = [(a, b * golden) for a in (1, -1) for b in (1, -1)]
-    corners = np.array([point for a, b in pairs for point in ((0, a, b), (a, b, 0), (b, 0, a))])
-    corners = corners / np.linalg.norm(corners[0]) @ rotation((0.3, 0.5, 0.7), 1.0).T
-    nearness = np.sort(points @ corners.T, axis=-1)
-    patch = nearness[..., -1] > 0.925
-    seam = (nearness[..., -1] - nearness[..., -2] < 0.02) & ~patch
+    signs = [(a, b) for a in (1, -1) for b in (1, -1)]
+    pentagons = [point for a, b in signs for point in _turns((0, a, b * golden))]
+    hexagons = [point for a, b in signs for point in _turns((0, a / golden, b * golden))]
+    hexagons += [(a, b, c) for a, b in signs for c in (1, -1)]
+    # A point belongs to the face whose plane it is farthest out to; hexagons are nearer to the middle.
+    planes = np.array([np.array(face) / np.linalg.norm(face) for face in pentagons + hexagons])
+    planes[len(pentagons) :] *= PENTAGON_TO_HEXAGON
+    out = points @ (planes @ rotation((0.3, 0.5, 0.7), 1.0).T).T
+    best = np.sort(out, axis=-1)
+    patch = out.argmax(axis=-1) < len(pentagons)
+    seam = best[..., -1] - best[..., -2] < 0.018
     dark = pick(rng, (grey(rng, 0.04, 0.12), grey(rng, 0.04, 0.12), vivid(rng, 0.3, 0.8)))
     image = np.where(patch[..., None], dark, 242.0)
-    return np.where(seam[..., None], 140.0, image)
+    return np.where((seam & ~patch)[..., None], 140.0, image)
+
+
+def _turns(point: tuple[float, float, float]) -> list[tuple[float, float, float]]:
+    """A point and its cyclic permutations."""
+    x, y, z = point
+    return [(x, y, z), (y, z, x), (z, x, y)]
 
 
 def _basketball(rng: np.random.Generator, points: Floats) -> Floats:
