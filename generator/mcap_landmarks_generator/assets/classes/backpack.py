@@ -6,7 +6,18 @@ from mcap_landmarks_generator.assets.asset import AssetClass, Variant
 from mcap_landmarks_generator.assets.section import Box, Section
 from mcap_landmarks_generator.assets.shapes import limb, rounded_box, rounded_rectangle, stack
 from mcap_landmarks_generator.assets.solid import Solid
-from mcap_landmarks_generator.assets.texture import Colour, Image, grey, hsv, noise, pick, plain, stroke, to_image, vivid
+from mcap_landmarks_generator.assets.texture import (
+    Colour,
+    Image,
+    grey,
+    hsv,
+    noise,
+    pick,
+    plain,
+    stroke,
+    to_image,
+    vivid,
+)
 
 # The bag, two layers of pockets in front of it, and the side pockets: upright up to TOP_M, above the LiDAR's band.
 BAG = Box(0.19, 0.33, x_m=-0.045, corner_m=0.06)
@@ -37,7 +48,7 @@ def shape(rng: np.random.Generator) -> list[Solid]:
 def _arched(box: Box, height: float, material: str) -> Solid:
     """A stuffed bag on a box's footprint, its upper end rounded like a loaf."""
     levels = [(0.0, 0.88), (0.035, 1.0), (TOP_M, 1.0)]
-    levels += [(TOP_M + (height - TOP_M) * t, np.sqrt(1 - 0.85 * t**3)) for t in (0.4, 0.7, 0.9, 1.0)]
+    levels += [(TOP_M + (height - TOP_M) * t, np.sqrt(1 - 0.8 * t**5)) for t in (0.45, 0.75, 0.92, 1.0)]
     outlines = []
     for z, scale in levels:
         length, width = box.length_m * (0.4 + 0.6 * scale), box.width_m * scale
@@ -64,12 +75,13 @@ def _straps(height: float) -> list[Solid]:
     for side in (1, -1):
         path = [
             (back + 0.03, side * 0.06, height * 0.94),
-            (back - 0.05, side * 0.075, height * 0.86),
-            (back - 0.06, side * 0.095, height * 0.62),
-            (back - 0.015, side * 0.12, 0.23),
-            (back + 0.03, side * 0.13, 0.20),
+            (back - 0.04, side * 0.10, height * 0.90),
+            (back - 0.06, side * 0.18, height * 0.72),
+            (back - 0.05, side * 0.21, height * 0.55),
+            (back - 0.01, side * 0.17, 0.25),
+            (back + 0.03, side * 0.13, 0.21),
         ]
-        solids.append(limb(path, np.tile([0.012, 0.03], (5, 1)), "strap", 8))
+        solids.append(limb(path, np.tile([0.014, 0.032], (6, 1)), "strap", 8))
     turn = np.linspace(0, np.pi, 6)
     loop = np.column_stack([np.full(6, BAG.x_m - 0.03), 0.045 * np.cos(turn), height - 0.02 + 0.05 * np.sin(turn)])
     return [*solids, limb(loop, 0.009, "strap", 6)]
@@ -77,8 +89,8 @@ def _straps(height: float) -> list[Solid]:
 
 def paint(rng: np.random.Generator) -> dict[str, Image]:
     """Cloth in one dark colour with folds, light zips, and black straps."""
-    dark = pick(rng, (grey(rng, 0.12, 0.25), grey(rng, 0.12, 0.25), hsv(0.61, rng.uniform(0.4, 0.7), 0.3)))
-    colour = pick(rng, (dark, dark, dark, hsv(rng.uniform(-0.02, 0.02), 0.8, 0.5), hsv(0.25, 0.4, 0.35)))
+    dark = pick(rng, (grey(rng, 0.06, 0.13), grey(rng, 0.06, 0.13), hsv(0.62, rng.uniform(0.4, 0.7), 0.22)))
+    colour = pick(rng, (dark, dark, dark, dark, hsv(rng.uniform(-0.02, 0.02), 0.8, 0.4)))
     return {
         "bag": _creased(rng, colour, grey(rng, 0.3, 0.5)),
         "pouch": _creased(rng, 0.85 * colour, grey(rng, 0.3, 0.5)),
@@ -91,8 +103,8 @@ def _creased(rng: np.random.Generator, colour: Colour, zip_colour: Colour) -> Im
     """Cloth that hangs in folds, lighter towards the top, with the line of a zip around it."""
     size_px = 128
     v = 1 - (np.arange(size_px) + 0.5) / size_px
-    folds = 1 + 0.7 * (noise(rng, size_px, size_px, octaves=5, cells=4) - 0.5)
-    lit = np.interp(v, [0.0, 0.2, 0.7, 1.0], [0.6, 0.9, 1.1, 1.5])
+    folds = 1 + 1.0 * (noise(rng, size_px, size_px, octaves=5, cells=4) - 0.5)
+    lit = np.interp(v, [0.0, 0.2, 0.7, 1.0], [0.7, 0.9, 1.1, 1.9])
     image = to_image(colour * (folds * lit[:, None])[..., None])
     stroke(image, [(0.0, 0.55), (1.0, 0.55)], 0.016, 0.4 * colour)
     stroke(image, [(0.0, 0.53), (1.0, 0.53)], 0.008, zip_colour)

@@ -26,7 +26,7 @@ def shape(rng: np.random.Generator) -> list[Solid]:
         up = 0.06 + height * (index + 0.5)
         board = box(0.028, length, 0.8 * height, "wood").turned((0, 1, 0), -lean)
         solids.append(board.moved(-0.2 - up * np.tan(lean), z_m=SEAT_M + up))
-    arms = rng.random() < 0.8
+    arms = rng.random() < 0.5
     for side in (1, -1):
         solids += [solid.moved(y_m=side * FRAME_Y_M) for solid in _frame(lean, arms)]
     return solids

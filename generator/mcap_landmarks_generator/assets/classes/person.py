@@ -152,9 +152,7 @@ def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
     denim = hsv(0.61, rng.uniform(0.3, 0.7), rng.uniform(0.2, 0.6))
     top = pick(rng, (vivid(rng), muted, grey(rng, 0.08, 0.95)))
     trousers = pick(rng, (denim, denim, grey(rng, 0.08, 0.5), hsv(0.1, 0.4, rng.uniform(0.3, 0.7)), muted))
-    coat = pick(
-        rng, (muted, muted, grey(rng, 0.07, 0.45), hsv(0.61, 0.6, rng.uniform(0.2, 0.5)), vivid(rng), top)
-    )
+    coat = pick(rng, (muted, muted, grey(rng, 0.07, 0.45), hsv(0.61, 0.6, rng.uniform(0.2, 0.5)), vivid(rng), top))
     hair = (grey(rng, 0.04, 0.18), hsv(0.07, 0.6, rng.uniform(0.2, 0.4)), hsv(0.12, 0.5, 0.75), grey(rng, 0.5, 0.8))
     return {
         "top": _coat_cloth(rng, coat) if variant == "coat" else cloth(rng, top),

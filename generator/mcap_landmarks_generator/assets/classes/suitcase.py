@@ -1,4 +1,4 @@
-"""Suitcase: an upright trolley, ribbed or of cloth, with dark edges, four castors, and handles."""
+"""Suitcase: an upright ribbed trolley with round corners, a dark seam, four castors, and handles."""
 
 from dataclasses import replace
 
@@ -15,8 +15,6 @@ from mcap_landmarks_generator.assets.texture import (
     hsv,
     pick,
     plain,
-    rectangle,
-    stroke,
     to_image,
     weathered,
 )
@@ -32,7 +30,7 @@ _HALF_PX = 128
 
 
 def shape(rng: np.random.Generator) -> list[Solid]:
-    """A case of 0.5 to 0.66 m without its handle, which is down or pulled out by up to 0.25 m."""
+    """A case of 0.5 to 0.66 m without its handle, which is mostly down, at times pulled out by up to 0.25 m."""
     height = rng.uniform(0.50, 0.66)
     middle = FLOOR_M + height / 2
     top = FLOOR_M + height
@@ -73,7 +71,7 @@ def _seam(height: float) -> Solid:
 
 def _handles(rng: np.random.Generator, top: float, middle: float) -> list[Solid]:
     """The telescopic handle, and the carrying handles on top and on one side."""
-    pulled = rng.choice([0.03, 0.03, rng.uniform(0.1, 0.25)])
+    pulled = rng.choice([0.03, rng.uniform(0.08, 0.25)], p=[0.85, 0.15])
     x = -DEPTH_M * 0.32
     solids = [limb([(x, side * 0.1, top - 0.02), (x, side * 0.1, top + pulled)], 0.012, "metal", 6) for side in (1, -1)]
     solids.append(rounded_box(0.036, 0.25, 0.036, 0.01, "rubber", 0.01).moved(x, z_m=top + pulled))
@@ -91,11 +89,11 @@ def _handles(rng: np.random.Generator, top: float, middle: float) -> list[Solid]
 
 
 def paint(rng: np.random.Generator) -> dict[str, Image]:
-    """A ribbed shell or a cloth case with pockets, in black, grey, blue or red; edges and handles are dark."""
+    """A ribbed shell in black, grey, blue or red; edges and handles are dark."""
     dark = pick(rng, (grey(rng, 0.10, 0.22), grey(rng, 0.10, 0.22), hsv(0.62, 0.6, rng.uniform(0.2, 0.45))))
-    red = hsv(rng.uniform(-0.03, 0.01), rng.uniform(0.7, 0.9), rng.uniform(0.4, 0.7))
-    shell = pick(rng, (dark, dark, dark, red, grey(rng, 0.3, 0.5), hsv(rng.uniform(0.52, 0.62), 0.6, 0.5)))
-    half = _ribbed(rng, shell) if rng.random() < 0.99 else _pocketed(rng, shell)
+    red = hsv(rng.uniform(-0.03, 0.01), rng.uniform(0.7, 0.9), rng.uniform(0.3, 0.5))
+    shell = pick(rng, (dark, dark, dark, dark, red, grey(rng, 0.2, 0.35), hsv(rng.uniform(0.52, 0.62), 0.6, 0.45)))
+    half = _ribbed(rng, shell)
     return {
         "shell": weathered(rng, np.concatenate([half, half], axis=1), 0.12),
         "edge": plain(rng, 0.3 * shell),
@@ -105,7 +103,7 @@ def paint(rng: np.random.Generator) -> dict[str, Image]:
 
 
 def _ribbed(rng: np.random.Generator, colour: Colour) -> Image:
-    """Grooves on faces and sides, light where the shell bends to the sky, and dark caps on the corners."""
+    """Half of the way around a shell: grooves on face and side, light where it bends to the sky."""
     count = int(rng.integers(5, 10))
     u = (np.arange(_HALF_PX) + 0.5) / _HALF_PX
     v = 1 - u
@@ -115,30 +113,7 @@ def _ribbed(rng: np.random.Generator, colour: Colour) -> Image:
     inside = (u > _SIDE_U[0]) & (u < _SIDE_U[1]) | (u > _FACE_U[0])
     rows = np.interp(v, [0.0, 0.08, 0.12, 0.88, 0.92, 0.97, 1.0], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
     relief = 1 + rows[:, None] * np.where(inside, rib - 1, 0.0)[None, :]
-    image = to_image(colour * relief[..., None] * _lit(v)[:, None, None])
-    for low, high in ((0.0, 0.09), (0.34, 0.44), (0.97, 1.0)):
-        for bottom in ():
-            rectangle(image, (low, bottom), (high, bottom + 0.12), 0.35 * colour)
-    return image
-
-
-def _pocketed(rng: np.random.Generator, colour: Colour) -> Image:
-    """Cloth with two zipped pockets on the faces, piping along the edges and a label."""
-    v = 1 - (np.arange(_HALF_PX) + 0.5) / _HALF_PX
-    weave = 0.9 + 0.2 * rng.random((_HALF_PX, _HALF_PX))
-    image = to_image(colour * (weave * _lit(v)[:, None])[..., None])
-    zip_colour, piping = pick(rng, (0.3 * colour, grey(rng, 0.5, 0.7))), 0.4 * colour
-    split = rng.uniform(0.5, 0.62)
-    low, high = _FACE_U[0] + 0.05, _FACE_U[1] - 0.05
-    for bottom, top in ((0.08, split - 0.02), (split + 0.02, 0.93)):
-        rectangle(image, (low, bottom), (high, top), 1.12 * colour)
-        rectangle(image, (low, bottom), (high, bottom + 0.05), 0.8 * colour)
-        edge = [(low, bottom), (low, top), (high, top), (high, bottom), (low, bottom)]
-        stroke(image, edge, 0.02, piping)
-        stroke(image, [(low + 0.03, top - 0.05), (high - 0.03, top - 0.05)], 0.012, zip_colour)
-    for u in (_SIDE_U[0] - 0.01, _SIDE_U[1] + 0.01, _FACE_U[0] - 0.01):
-        stroke(image, [(u, 0.03), (u, 0.97)], 0.015, piping)
-    return image
+    return to_image(colour * relief[..., None] * _lit(v)[:, None, None])
 
 
 def _lit(v: Floats) -> Floats:
