@@ -65,7 +65,7 @@ def _piping(box: Box, height: float) -> Solid:
     arch = np.column_stack(
         [x, 0.99 * width * np.cos(turn), start + (height - start - 0.004) * np.abs(np.sin(turn)) ** 0.6]
     )
-    return limb(arch, np.tile([0.009, 0.006], (12, 1)), "strap", 5, front=(1, 0, 0))
+    return limb(arch, np.tile([0.009, 0.006], (12, 1)), "piping", 5, front=(1, 0, 0))
 
 
 def _straps(height: float) -> list[Solid]:
@@ -75,10 +75,10 @@ def _straps(height: float) -> list[Solid]:
     for side in (1, -1):
         path = [
             (back + 0.03, side * 0.06, height * 0.94),
-            (back - 0.04, side * 0.10, height * 0.90),
-            (back - 0.06, side * 0.18, height * 0.72),
-            (back - 0.05, side * 0.21, height * 0.55),
-            (back - 0.01, side * 0.17, 0.25),
+            (back - 0.03, side * 0.09, height * 0.90),
+            (back - 0.045, side * 0.13, height * 0.72),
+            (back - 0.04, side * 0.16, height * 0.55),
+            (back - 0.01, side * 0.15, 0.25),
             (back + 0.03, side * 0.13, 0.21),
         ]
         solids.append(limb(path, np.tile([0.014, 0.032], (6, 1)), "strap", 8))
@@ -95,6 +95,7 @@ def paint(rng: np.random.Generator) -> dict[str, Image]:
         "bag": _creased(rng, colour, grey(rng, 0.3, 0.5)),
         "pouch": _creased(rng, 0.85 * colour, grey(rng, 0.3, 0.5)),
         "badge": plain(rng, pick(rng, (grey(rng, 0.7, 0.95), vivid(rng)))),
+        "piping": plain(rng, pick(rng, (grey(rng, 0.35, 0.6), 0.3 * colour))),
         "strap": plain(rng, grey(rng, 0.05, 0.12)),
     }
 
@@ -107,7 +108,7 @@ def _creased(rng: np.random.Generator, colour: Colour, zip_colour: Colour) -> Im
     lit = np.interp(v, [0.0, 0.2, 0.7, 1.0], [0.7, 0.9, 1.1, 1.9])
     image = to_image(colour * (folds * lit[:, None])[..., None])
     stroke(image, [(0.0, 0.55), (1.0, 0.55)], 0.016, 0.4 * colour)
-    stroke(image, [(0.0, 0.53), (1.0, 0.53)], 0.008, zip_colour)
+    stroke(image, [(0.0, 0.53), (1.0, 0.53)], 0.016, zip_colour)
     return image
 
 

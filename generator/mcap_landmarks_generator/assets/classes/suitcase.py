@@ -22,7 +22,7 @@ from mcap_landmarks_generator.assets.texture import (
 DEPTH_M, WIDTH_M, CORNER_M = 0.28, 0.50, 0.04
 FLOOR_M = 0.05
 # Radius of the corners as they are seen from the front.
-ROUND_M = 0.07
+ROUND_M = 0.09
 # What lies where on a half of the shell's picture, as shares of its width: from a corner around a narrow side to the
 # end of a large face. The other half of the way around is the same.
 _SIDE_U, _FACE_U = (0.085, 0.346), (0.431, 1.0)
@@ -92,7 +92,8 @@ def paint(rng: np.random.Generator) -> dict[str, Image]:
     """A ribbed shell in black, grey, blue or red; edges and handles are dark."""
     dark = pick(rng, (grey(rng, 0.10, 0.22), grey(rng, 0.10, 0.22), hsv(0.62, 0.6, rng.uniform(0.2, 0.45))))
     red = hsv(rng.uniform(-0.03, 0.01), rng.uniform(0.7, 0.9), rng.uniform(0.3, 0.5))
-    shell = pick(rng, (dark, dark, dark, dark, red, grey(rng, 0.2, 0.35), hsv(rng.uniform(0.52, 0.62), 0.6, 0.45)))
+    blue = hsv(rng.uniform(0.52, 0.62), 0.6, 0.45)
+    shell = pick(rng, (dark, dark, dark, dark, blue, blue, grey(rng, 0.2, 0.35), red))
     half = _ribbed(rng, shell)
     return {
         "shell": weathered(rng, np.concatenate([half, half], axis=1), 0.12),
