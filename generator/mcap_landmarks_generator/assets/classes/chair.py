@@ -14,13 +14,13 @@ LEG_M, LENGTH_M, WIDTH_M = 0.022, 0.38, 0.38
 def shape(rng: np.random.Generator) -> list[Solid]:
     """A chair that faces +x, its seat at 0.43 to 0.48 m, its back 0.4 to 0.55 m higher."""
     seat, back = rng.uniform(0.43, 0.48), rng.uniform(0.40, 0.55)
-    solids = [rounded_box(0.46, 0.46, 0.045, 0.04, "seat", 0.015).moved(z_m=seat)]
+    solids = [rounded_box(0.46, 0.46, 0.065, 0.04, "seat", 0.02).moved(z_m=seat)]
     for x in (1, -1):
         for y in (1, -1):
-            leg = lathe([(LEG_M, 0), (LEG_M, 0.2), (1.1 * LEG_M, seat)], "frame", 10)
+            leg = lathe([(LEG_M, 0), (LEG_M, 0.2), (0.8 * LEG_M, 0.23), (0.8 * LEG_M, seat)], "frame", 10)
             solids.append(leg.moved(x * LENGTH_M / 2, y * WIDTH_M / 2))
         rail = [(x * LENGTH_M / 2, -WIDTH_M / 2, 0.28), (x * LENGTH_M / 2, WIDTH_M / 2, 0.28)]
-        solids.append(limb(rail, 0.013, "frame", 6))
+        solids.append(limb(rail, 0.009, "frame", 6))
     if rng.random() < 0.25:
         solids += _arms(seat)
     return solids + _back(rng, seat, back)
@@ -42,18 +42,18 @@ def _back(rng: np.random.Generator, seat: float, back: float) -> list[Solid]:
     for y in (1, -1):
         post = [(-LENGTH_M / 2, y * WIDTH_M / 2, 0.0), (-LENGTH_M / 2 - back * lean, y * WIDTH_M / 2, back)]
         solids.append(limb(post, 0.020, "frame", 8).moved(z_m=seat))
-    kind = rng.choice(3, p=[0.15, 0.75, 0.1])
+    kind = rng.choice(3, p=[0.2, 0.6, 0.2])
     if kind == 0:
         parts = [(0.03, 0.36, back * 0.17, share) for share in (0.3, 0.6, 0.9)]
     elif kind == 1:
-        parts = [(0.035, 0.42, back * 0.62, 0.66)]
+        parts = [(0.045, 0.43, back * 0.86, 0.60)]
     else:
         parts = [(0.03, 0.40, back * 0.16, 0.92)]
         for offset in (-0.12, -0.04, 0.04, 0.12):
             spindle = [(-LENGTH_M / 2, offset, 0.0), (-LENGTH_M / 2 - back * lean * 0.9, offset, back * 0.9)]
             solids.append(limb(spindle, 0.011, "frame", 6).moved(z_m=seat))
     for depth, width, height, share in parts:
-        board = box(depth, width, height, "seat").turned((0, 1, 0), -np.arctan(lean))
+        board = rounded_box(depth, width, height, 0.02, "seat", 0.02).turned((0, 1, 0), -np.arctan(lean))
         solids.append(board.moved(-LENGTH_M / 2 - back * lean * share, z_m=seat + back * share))
     return solids
 
@@ -61,10 +61,11 @@ def _back(rng: np.random.Generator, seat: float, back: float) -> list[Solid]:
 def paint(rng: np.random.Generator) -> dict[str, Image]:
     """Wood, or a coloured seat on a painted or metal frame."""
     wood = hsv(rng.uniform(0.05, 0.1), rng.uniform(0.45, 0.7), rng.uniform(0.3, 0.7))
-    if rng.random() < 0.5:
+    if rng.random() < 0.2:
         return {"seat": wooden(rng, wood), "frame": wooden(rng, 0.85 * wood)}
-    colour = pick(rng, (vivid(rng, 0.4), grey(rng, 0.06, 0.2), grey(rng, 0.06, 0.2), grey(rng, 0.75, 0.95)))
-    frame = pick(rng, (0.85 * colour, 0.85 * colour, grey(rng, 0.06, 0.2), grey(rng, 0.6, 0.8)))
+    dark = grey(rng, 0.05, 0.18)
+    colour = pick(rng, (vivid(rng, 0.2, 0.6), dark, dark, dark, dark, grey(rng, 0.5, 0.95)))
+    frame = pick(rng, (0.85 * colour, 0.85 * colour, dark, dark, grey(rng, 0.6, 0.8)))
     return {"seat": plain(rng, colour, 64), "frame": plain(rng, frame)}
 
 
