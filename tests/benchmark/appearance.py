@@ -50,7 +50,7 @@ class Network:
 
     def __init__(self, path: Path, confidence: float = USUAL_CONFIDENCE) -> None:
         self._config = DetectConfig(confidence=confidence)
-        self._model = read_detector(open_session(path), None, self._config)
+        self._model = read_detector(open_session(path, threads=1), None, self._config)
         self._above = thresholds(self._model, self._config)
 
     def asked(self, image: Image, class_name: str, box_xyxy: np.ndarray) -> Said:
