@@ -1,4 +1,4 @@
-"""Person: standing or striding in trousers, or in a coat that reaches almost to the ground."""
+"""Person: standing or striding in trousers, or in a coat over trousers so wide that a LiDAR sees them."""
 
 from functools import partial
 
@@ -20,6 +20,7 @@ from mcap_landmarks_generator.assets.texture import (
     noise,
     pick,
     plain,
+    polygon,
     rectangle,
     to_image,
     vivid,
@@ -32,11 +33,14 @@ SHIRT_LEVELS = (
     (1.40, 0.105, 0.19), (1.45, 0.08, 0.15), (1.48, 0.062, 0.085), (1.51, 0.05, 0.06),
 )  # fmt: skip
 COAT_LEVELS = (
-    (0.36, 0.222, 0.232), (0.58, 0.180, 0.210), (0.82, 0.145, 0.19), (1.03, 0.112, 0.16), (1.18, 0.112, 0.165),
+    (0.36, 0.185, 0.215), (0.58, 0.140, 0.195), (0.82, 0.128, 0.185), (1.03, 0.112, 0.16), (1.18, 0.112, 0.165),
     (1.30, 0.12, 0.185), (1.40, 0.108, 0.195), (1.45, 0.082, 0.155), (1.49, 0.064, 0.085), (1.53, 0.066, 0.072),
 )  # fmt: skip
 SHIN_M = 0.06
 COAT_M = 0.25
+# Where the picture of the long clothes, from below up by length, has the coat's hem and the upper end of the gap
+# between the legs, whose colour is that of what lies in their shade.
+COAT_HEM_V, CROTCH_V, GAP = (0.42, 0.55), 0.5, (48.0, 46.0, 44.0)
 # Where the shins stand: (x, y) of the left and of the right one.
 STANCES = {"legs": ((0.0, 0.10), (0.0, -0.10)), "stride": ((0.13, 0.08), (-0.13, -0.08))}
 ON_LEGS = {name: Section(tuple(Disc(SHIN_M, x, y) for x, y in stance)) for name, stance in STANCES.items()}
@@ -85,13 +89,13 @@ def _torso(k: float, broad: float) -> Solid:
 
 
 def _coat(k: float, broad: float) -> list[Solid]:
-    """A long coat of fixed width at its hem, with shoes under it."""
+    """A coat over trousers of fixed width at their hem, with shoes under them."""
     hem = circle(COAT_M, 24)
     wide = [(z * k, circle(1.0, 24) * (x, y) * (1 if z < 0.6 else k * broad)) for z, x, y in COAT_LEVELS]
     skirt = [(0.105, hem), (0.22, hem)]
     belt = circle(k * broad, 20) * (0.128, 0.176)
     return [
-        stack(skirt + wide, "top"),
+        stack(skirt + wide, "trousers"),
         stack([(1.01 * k, belt), (1.05 * k, belt)], "shoes"),
         _shoe(np.array([0.06, 0.09, 0.0])),
         _shoe(np.array([0.06, -0.09, 0.0])),
@@ -150,13 +154,15 @@ def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
     skin = hsv(rng.uniform(0.04, 0.08), rng.uniform(0.25, 0.6), rng.uniform(0.4, 0.97))
     muted = hsv(rng.random(), rng.uniform(0.2, 0.6), rng.uniform(0.2, 0.6))
     denim = hsv(0.61, rng.uniform(0.3, 0.7), rng.uniform(0.2, 0.6))
-    top = pick(rng, (vivid(rng), muted, grey(rng, 0.08, 0.95)))
-    trousers = pick(rng, (denim, denim, grey(rng, 0.08, 0.5), hsv(0.1, 0.4, rng.uniform(0.3, 0.7)), muted))
-    coat = pick(rng, (muted, muted, grey(rng, 0.07, 0.45), hsv(0.61, 0.6, rng.uniform(0.2, 0.5)), vivid(rng), top))
+    top = pick(rng, (vivid(rng, 0.25, 0.8), muted, grey(rng, 0.08, 0.8)))
+    trousers = pick(rng, (denim, denim, denim, grey(rng, 0.08, 0.5), grey(rng, 0.08, 0.3), muted))
+    navy = hsv(0.61, 0.6, rng.uniform(0.2, 0.45))
+    coat = pick(rng, (0.7 * muted, grey(rng, 0.07, 0.35), navy, vivid(rng, 0.25, 0.6)))
+    below = pick(rng, (denim, grey(rng, 0.06, 0.2), navy))
     hair = (grey(rng, 0.04, 0.18), hsv(0.07, 0.6, rng.uniform(0.2, 0.4)), hsv(0.12, 0.5, 0.75), grey(rng, 0.5, 0.8))
     return {
-        "top": _coat_cloth(rng, coat) if variant == "coat" else cloth(rng, top),
-        "trousers": plain(rng, trousers),
+        "top": plain(rng, coat) if variant == "coat" else cloth(rng, top),
+        "trousers": _long_clothes(rng, coat, below) if variant == "coat" else plain(rng, trousers),
         "shoes": plain(rng, pick(rng, (grey(rng, 0.05, 0.3), hsv(0.06, 0.5, 0.3), grey(rng, 0.7, 0.95)))),
         "skin": plain(rng, skin, mottle=0.05),
         "hair": plain(rng, pick(rng, hair), mottle=0.25),
@@ -164,17 +170,22 @@ def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
     }
 
 
-def _coat_cloth(rng: np.random.Generator, colour: Colour) -> Image:
-    """A coat's cloth: folds that deepen towards the hem, the dark line of its opening, and buttons beside it."""
-    size_px = 64
+def _long_clothes(rng: np.random.Generator, coat: Colour, trousers: Colour) -> Image:
+    """A coat over wide trousers: folds, the coat's opening and buttons, and the dark gap between the legs."""
+    size_px = 128
     u = (np.arange(size_px) + 0.5) / size_px
     v = 1 - u
     waves = np.sin(2 * np.pi * (int(rng.integers(7, 11)) * u + rng.random())) * (0.6 + 0.4 * noise(rng, 1, size_px)[0])
-    depth = np.interp(v, [0.0, 0.1, 0.6, 1.0], [0.05, 0.3, 0.08, 0.05])
+    hem = rng.uniform(*COAT_HEM_V)
+    colour = np.where((v > hem)[:, None, None], coat, trousers)
+    depth = np.interp(v, [0.0, 0.15, 0.6, 1.0], [0.05, 0.25, 0.08, 0.05])
     image = to_image(colour * (1 + depth[:, None] * waves[None, :])[..., None])
-    rectangle(image, (0.0, 0.05), (0.02, 0.95), 0.5 * colour)
-    for height in (0.55, 0.63, 0.71, 0.79):
-        ellipse(image, (0.05, height), (0.012, 0.012), 0.3 * colour)
+    for middle in (0.0, 0.5, 1.0):
+        polygon(image, [(middle - 0.08, 0.0), (middle + 0.08, 0.0), (middle, CROTCH_V)], GAP)
+    rectangle(image, (0.0, hem), (1.0, hem + 0.012), 0.6 * coat)
+    rectangle(image, (0.0, hem), (0.012, 0.97), 0.5 * coat)
+    for height in (0.62, 0.70, 0.78):
+        ellipse(image, (0.03, height), (0.008, 0.008), 0.3 * coat)
     return weathered(rng, image, 0.1)
 
 

@@ -22,7 +22,7 @@ from mcap_landmarks_generator.assets.texture import (
 DEPTH_M, WIDTH_M, CORNER_M = 0.28, 0.50, 0.04
 FLOOR_M = 0.05
 # Radius of the corners as they are seen from the front.
-ROUND_M = 0.09
+ROUND_M = 0.08
 # What lies where on a half of the shell's picture, as shares of its width: from a corner around a narrow side to the
 # end of a large face. The other half of the way around is the same.
 _SIDE_U, _FACE_U = (0.085, 0.346), (0.431, 1.0)
@@ -49,7 +49,7 @@ def _body(height: float) -> Solid:
     turn = np.linspace(0.0, np.pi / 2, 5)
     levels = []
     for inset, depth in zip(1 - np.sin(turn), 1 - np.cos(turn), strict=True):
-        width, length = WIDTH_M - 2 * ROUND_M * inset, DEPTH_M - 0.002 - 0.08 * inset
+        width, length = WIDTH_M - 2 * ROUND_M * inset, DEPTH_M - 0.002 - 0.06 * inset
         outline = rounded_rectangle(length, width, CORNER_M * (1 - 0.5 * inset))
         levels.append((height / 2 - ROUND_M * depth, outline))
     solid = stack([(-z, outline) for z, outline in levels] + levels[::-1], "shell")
