@@ -25,6 +25,8 @@ _FRONT_RAD = np.deg2rad(30.0)
 # The object stands off the middle of the image by up to this.
 _ASIDE_RAD = 0.3
 _TRIES = 10
+# What hardly ever fits into the image, as a car at 2 m, is given up after so many worlds without a single view.
+_WORLDS_WITHOUT = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +52,8 @@ def views(
             shown += 1
             if shown == count:
                 return
+        if index + 1 == _WORLDS_WITHOUT and not shown:
+            return
 
 
 def _world(

@@ -21,7 +21,7 @@ def shape(rng: np.random.Generator) -> list[Solid]:
             solids.append(leg.moved(x * LENGTH_M / 2, y * WIDTH_M / 2))
         rail = [(x * LENGTH_M / 2, -WIDTH_M / 2, 0.28), (x * LENGTH_M / 2, WIDTH_M / 2, 0.28)]
         solids.append(limb(rail, 0.009, "frame", 6))
-    if rng.random() < 0.25:
+    if rng.random() < 0.4:
         solids += _arms(seat)
     return solids + _back(rng, seat, back)
 
@@ -42,18 +42,18 @@ def _back(rng: np.random.Generator, seat: float, back: float) -> list[Solid]:
     for y in (1, -1):
         post = [(-LENGTH_M / 2, y * WIDTH_M / 2, 0.0), (-LENGTH_M / 2 - back * lean, y * WIDTH_M / 2, back)]
         solids.append(limb(post, 0.020, "frame", 8).moved(z_m=seat))
-    kind = rng.choice(3, p=[0.2, 0.6, 0.2])
+    kind = rng.choice(3, p=[0.55, 0.3, 0.15])
     if kind == 0:
         parts = [(0.03, 0.36, back * 0.17, share) for share in (0.3, 0.6, 0.9)]
     elif kind == 1:
-        parts = [(0.045, 0.43, back * 0.86, 0.60)]
+        parts = [(0.04, 0.42, back * 0.62, 0.68)]
     else:
         parts = [(0.03, 0.40, back * 0.16, 0.92)]
         for offset in (-0.12, -0.04, 0.04, 0.12):
             spindle = [(-LENGTH_M / 2, offset, 0.0), (-LENGTH_M / 2 - back * lean * 0.9, offset, back * 0.9)]
             solids.append(limb(spindle, 0.011, "frame", 6).moved(z_m=seat))
     for depth, width, height, share in parts:
-        board = rounded_box(depth, width, height, 0.02, "seat", 0.02).turned((0, 1, 0), -np.arctan(lean))
+        board = rounded_box(depth, width, height, 0.012, "seat", 0.01).turned((0, 1, 0), -np.arctan(lean))
         solids.append(board.moved(-LENGTH_M / 2 - back * lean * share, z_m=seat + back * share))
     return solids
 
