@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from mcap_landmarks_generator.clock import Delivered, Delivery, measurement_times, to_ns
 from mcap_landmarks_generator.history import History, rotate
+from mcap_landmarks_generator.mounts import Mount
 from mcap_landmarks_generator.odometry import true_poses
 from mcap_landmarks_generator.randomness import Stream, draws
-from mcap_landmarks_generator.robot import BASE_FROM_OPTICAL, CAMERA_IN_BASE_M
 from mcap_landmarks_generator.sensor_specs import CameraSpec
 
 Floats = NDArray[np.float64]
@@ -60,17 +60,21 @@ class ImageJob:
     log_time_ns: int
     view: Viewpoint
     turn_radps: float
+    camera: int = 0
+    """Which of the robot's cameras."""
     readout: tuple[Viewpoint, ...] = ()
     """Of a rolling shutter: views from the first row's time to the last one's, evenly spaced."""
 
 
 class Camera:
-    """The images of one simulated recording that are to be rendered, in order."""
+    """The images of one camera of a simulated recording that are to be rendered, in order."""
 
-    def __init__(self, spec: CameraSpec, seed: int, start_ns: int) -> None:
-        self._spec = spec
-        self._times = measurement_times(spec, draws(seed, Stream.CAMERA_CLOCK))
-        self._delivery = Delivery(spec, seed, Stream.CAMERA_DELIVERY, start_ns)
+    def __init__(self, mount: Mount, number: int, start_ns: int) -> None:
+        """`number` says which of the robot's cameras it is."""
+        spec = mount.spec
+        self._mount, self._spec, self._number = mount, spec, number
+        self._times = measurement_times(spec, draws(mount.seed, Stream.CAMERA_CLOCK))
+        self._delivery = Delivery(spec, mount.seed, Stream.CAMERA_DELIVERY, start_ns)
         self._next_ns = next(self._times)
         self._index = 0
         self._readout_ns = to_ns(spec.rolling_shutter_s)
@@ -94,15 +98,15 @@ class Camera:
             index=self._index,
             stamp_ns=delivered.stamp_ns,
             log_time_ns=delivered.log_time_ns,
-            view=_view(history, middle_ns),
+            view=self._view(history, middle_ns),
             turn_radps=float(wrap(now - before)) / (_TURN_OVER_NS / 1e9),
-            readout=tuple(_view(history, row_ns) for row_ns in row_times),
+            camera=self._number,
+            readout=tuple(self._view(history, row_ns) for row_ns in row_times),
         )
 
-
-def _view(history: History, time_ns: int) -> Viewpoint:
-    at_ns = np.array([time_ns])
-    orientation = history.orientations(at_ns)
-    world_from_base = rotate(np.repeat(orientation, 3, axis=0), np.eye(3)).T
-    eye = history.positions(at_ns)[0] + world_from_base @ CAMERA_IN_BASE_M
-    return Viewpoint(eye, world_from_base @ BASE_FROM_OPTICAL, time_ns / 1e9)
+    def _view(self, history: History, time_ns: int) -> Viewpoint:
+        at_ns = np.array([time_ns])
+        orientation = history.orientations(at_ns)
+        world_from_base = rotate(np.repeat(orientation, 3, axis=0), np.eye(3)).T
+        eye = history.positions(at_ns)[0] + world_from_base @ self._mount.position_m
+        return Viewpoint(eye, world_from_base @ self._mount.base_from_optical, time_ns / 1e9)

@@ -26,6 +26,8 @@ ROBOT_RADIUS_M = 0.24
 """Radius of the circle about base_footprint that holds the robot, in whichever direction it turns."""
 _WALKER_RADIUS_M = 0.3
 """What one who walks needs to either side; a car half of its width."""
+_TAKEN = ("camera", "landmarks", "ground_truth")
+"""Namespaces of topics that are others'."""
 _FISHEYE = 4
 """Coefficients of the model equidistant."""
 
@@ -60,6 +62,10 @@ def stage(loaded: LoadedScenario) -> Staged:
         scenario = replace(scenario, objects=objects, groups=None, world=None)
     _check_variants(loaded, scenario)
     _check_lens(loaded, scenario.camera, ("camera", "distortion"))
+    for i, spec in enumerate(scenario.cameras):
+        _check_lens(loaded, spec, ("cameras", i, "distortion"))
+        if spec.name in {*_TAKEN, *(other.name for other in scenario.cameras[:i])}:
+            raise loaded.fault(("cameras", i, "name"), f"{spec.name} is taken; each camera needs a name of its own")
     if scenario.groups is not None:
         if scenario.trajectory.waypoints:
             raise loaded.fault(("trajectory", "waypoints"), "groups bring a way of their own; remove one of the two")

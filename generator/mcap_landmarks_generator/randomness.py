@@ -27,6 +27,7 @@ class Stream(IntEnum):
     IMU_CLOCK = 17
     IMU_DELIVERY = 18
     IMU = 19
+    CAMERAS = 20
 
 
 def draws(seed: int, stream: Stream, index: int = 0) -> np.random.Generator:

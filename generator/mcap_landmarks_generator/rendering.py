@@ -10,7 +10,7 @@ from multiprocessing.context import SpawnProcess
 from typing import Self
 
 import cv2
-from mcap_landmarks.channels import CAMERA_IMAGE, CAMERA_INFO, TRUTH_DETECTIONS
+from mcap_landmarks.channels import TRUTH_DETECTIONS
 from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.messages.images import CompressedImage
 from mcap_landmarks.stage import Stamped
@@ -19,9 +19,9 @@ from mcap_landmarks_generator.camera import ImageJob
 from mcap_landmarks_generator.checks import Staged
 from mcap_landmarks_generator.distortion import Lens
 from mcap_landmarks_generator.lens_renderer import LensRenderer, has_plain_lens
+from mcap_landmarks_generator.mounts import Mount, mounts
 from mcap_landmarks_generator.optics import Optics
 from mcap_landmarks_generator.renderer import Rendered, Renderer
-from mcap_landmarks_generator.robot import OPTICAL_FRAME
 from mcap_landmarks_generator.visibility import Drawn, true_detections
 
 Messages = tuple[Stamped, ...]
@@ -34,18 +34,8 @@ class Photographer:
 
     def __init__(self, staged: Staged) -> None:
         cv2.setNumThreads(1)
-        spec, seed = staged.scenario.camera, staged.scenario.seed
-        self._lens = Lens.of(spec)
-        self._optics = Optics(spec, self._lens.focal_px, seed)
         self._stack = ExitStack()
-        if has_plain_lens(spec):
-            renderer = self._stack.enter_context(Renderer(staged.scenario, staged.objects))
-            self._drawn_by: Drawn = renderer
-            self._draw: Callable[[ImageJob], Rendered] = lambda job: renderer.draw(job.view)
-        else:
-            bending = self._stack.enter_context(LensRenderer(staged.scenario, staged.objects))
-            self._drawn_by = bending
-            self._draw = lambda job: bending.draw(job.view, job.readout)
+        self._cameras = [_Studio(staged, mount, self._stack) for mount in mounts(staged.scenario)]
 
     def close(self) -> None:
         """Disconnect from PyBullet."""
@@ -53,14 +43,35 @@ class Photographer:
 
     def take(self, job: ImageJob) -> Messages:
         """The messages of one image."""
+        return self._cameras[job.camera].take(job)
+
+
+class _Studio:
+    """Takes the images of one camera; `stack` ends its renderer."""
+
+    def __init__(self, staged: Staged, mount: Mount, stack: ExitStack) -> None:
+        self._mount, self._lens = mount, Lens.of(mount.spec)
+        self._optics = Optics(mount.spec, self._lens.focal_px, mount.seed)
+        scenario = mount.scenario(staged.scenario)
+        if has_plain_lens(mount.spec):
+            renderer = stack.enter_context(Renderer(scenario, staged.objects))
+            self._drawn_by: Drawn = renderer
+            self._draw: Callable[[ImageJob], Rendered] = lambda job: renderer.draw(job.view)
+        else:
+            bending = stack.enter_context(LensRenderer(scenario, staged.objects))
+            self._drawn_by = bending
+            self._draw = lambda job: bending.draw(job.view, job.readout)
+
+    def take(self, job: ImageJob) -> Messages:
+        """The messages of one image."""
+        mount, stamp_ns = self._mount, job.stamp_ns
         rendered = self._draw(job)
-        detections = true_detections(rendered, self._drawn_by, job.view, job.stamp_ns)
+        detections = true_detections(rendered, self._drawn_by, job.view, stamp_ns, mount.frame_id)
         exposed = self._optics.expose(rendered.image, job.index, job.turn_radps, job.view.time_s)
-        image = CompressedImage(job.stamp_ns, OPTICAL_FRAME, "jpeg", self._optics.jpeg(exposed))
-        info = self._lens.info(job.stamp_ns, OPTICAL_FRAME)
+        image = CompressedImage(stamp_ns, mount.frame_id, "jpeg", self._optics.jpeg(exposed))
         return (
-            Stamped(CAMERA_IMAGE, job.log_time_ns, image),
-            Stamped(CAMERA_INFO, job.log_time_ns, info),
+            Stamped(mount.image, job.log_time_ns, image),
+            Stamped(mount.info, job.log_time_ns, self._lens.info(stamp_ns, mount.frame_id)),
             Stamped(TRUTH_DETECTIONS, job.log_time_ns, detections),
         )
 

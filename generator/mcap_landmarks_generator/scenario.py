@@ -17,6 +17,7 @@ from mcap_landmarks_generator.sensor_specs import (
     CameraSpec,
     ImuSpec,
     LidarSpec,
+    MountedCameraSpec,
     NotNegative,
     OdometrySpec,
     Positive,
@@ -225,6 +226,8 @@ class Scenario:
     light: LightSpec = field(default_factory=LightSpec)
     robot: RobotSpec = field(default_factory=RobotSpec)
     camera: CameraSpec = field(default_factory=CameraSpec)
+    cameras: tuple[MountedCameraSpec, ...] = ()
+    """Further cameras."""
     lidar: LidarSpec = field(default_factory=LidarSpec)
     ring_lidar: RingLidarSpec | None = None
     """A LiDAR of several rings beside `lidar`; none if left out."""

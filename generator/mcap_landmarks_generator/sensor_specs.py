@@ -91,6 +91,22 @@ class CameraSpec(SensorSpec):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MountedCameraSpec(CameraSpec):
+    """A further camera, in a place of its own on the robot."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = CONFIG
+
+    name: Annotated[str, Field(pattern="^[a-z][a-z0-9_]*$")]
+    """Its topics are /NAME/image_raw/compressed and /NAME/camera_info, its frame NAME_optical_frame."""
+    at: tuple[float, float, float]
+    """Where it is: x ahead, y to the left and z above base_footprint, in m."""
+    yaw_deg: float = 0.0
+    """Direction that it looks in, to the left of straight ahead."""
+    pitch_deg: Annotated[float, Field(ge=-90, le=90)] = 0.0
+    """How far it looks up."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LidarSpec(SensorSpec):
     """The LiDAR."""
 

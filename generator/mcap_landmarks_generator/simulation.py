@@ -17,17 +17,10 @@ from mcap_landmarks_generator.ground_truth import GroundTruth
 from mcap_landmarks_generator.history import History
 from mcap_landmarks_generator.imu import IMU_FRAME, KNOWN_AFTER_NS, ImuSensor
 from mcap_landmarks_generator.lidar import Lidar
+from mcap_landmarks_generator.mounts import camera_frames, mounts
 from mcap_landmarks_generator.odometry import OdometrySensor, true_poses
 from mcap_landmarks_generator.ring_lidar import RINGS_FRAME, RingLidar
-from mcap_landmarks_generator.robot import (
-    CAMERA_FROM_LINK_M,
-    LINK_FROM_FOOTPRINT_M,
-    OPTICAL_FRAME,
-    OPTICAL_FROM_CAMERA_M,
-    OPTICAL_FROM_CAMERA_XYZW,
-    SCAN_FRAME,
-    SCAN_FROM_LINK_M,
-)
+from mcap_landmarks_generator.robot import LINK_FROM_FOOTPRINT_M, SCAN_FRAME, SCAN_FROM_LINK_M
 from mcap_landmarks_generator.scenario import Scenario
 from mcap_landmarks_generator.trajectory import STEPS_PER_COMMAND, Driver, Steering
 from mcap_landmarks_generator.world import STEP_NS, World
@@ -55,7 +48,7 @@ class Simulation:
         self._is_watched = steering is None
         self._steering = steering or Driver(scenario.trajectory, staged.start, scenario.robot.speed_factor)
         self._history = History()
-        self._camera = Camera(scenario.camera, scenario.seed, scenario.start_ns)
+        self._cameras = [Camera(mount, i, scenario.start_ns) for i, mount in enumerate(mounts(scenario))]
         self._lidar = Lidar(scenario.lidar, scenario.seed, scenario.start_ns)
         rings = scenario.ring_lidar
         self._rings = RingLidar(rings, scenario.seed, scenario.start_ns) if rings is not None else None
@@ -122,7 +115,8 @@ class Simulation:
         yield from self._lidar.measure(self._history, world)
         if self._rings is not None:
             yield from self._rings.measure(self._history, world)
-        yield from self._camera.measure(self._history)
+        for camera in self._cameras:
+            yield from camera.measure(self._history)
 
     def _note_collisions(self, world: World) -> None:
         touched = world.touched()
@@ -156,8 +150,7 @@ def static_transforms(start_ns: int, scenario: Scenario | None = None) -> Stampe
     places = [
         (BASE_FRAME, "base_link", LINK_FROM_FOOTPRINT_M, upright),
         ("base_link", SCAN_FRAME, SCAN_FROM_LINK_M, upright),
-        ("base_link", "camera_link", CAMERA_FROM_LINK_M, upright),
-        ("camera_link", OPTICAL_FRAME, OPTICAL_FROM_CAMERA_M, np.array(OPTICAL_FROM_CAMERA_XYZW)),
+        *camera_frames(scenario or Scenario()),
     ]
     if scenario is not None and scenario.imu is not None:
         places.append((BASE_FRAME, IMU_FRAME, (0.0, 0.0, 0.0), upright))

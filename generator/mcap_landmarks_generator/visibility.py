@@ -26,7 +26,9 @@ class Drawn(Protocol):
         """Area in pixels of the image of an object's labelled parts, were none hidden by an object or the edge."""
 
 
-def true_detections(rendered: Rendered, renderer: Drawn, view: Viewpoint, stamp_ns: int) -> Detections:
+def true_detections(
+    rendered: Rendered, renderer: Drawn, view: Viewpoint, stamp_ns: int, frame_id: str = OPTICAL_FRAME
+) -> Detections:
     """Box of the visible labelled parts of each object, from the mask; the score is the visible share of them.
 
     The share counts what other objects and the image's edges hide. Objects are left out that show less than 4 pixels.
@@ -45,7 +47,7 @@ def true_detections(rendered: Rendered, renderer: Drawn, view: Viewpoint, stamp_
         names.append(one.placed.object_id)
         options.append(((one.placed.asset.name, round(share, 3)),))
         boxes.append(seen.box_xyxy)
-    return Detections(stamp_ns, OPTICAL_FRAME, tuple(names), tuple(options), np.array(boxes, float).reshape(-1, 4))
+    return Detections(stamp_ns, frame_id, tuple(names), tuple(options), np.array(boxes, float).reshape(-1, 4))
 
 
 @dataclass(frozen=True, slots=True)
