@@ -82,12 +82,14 @@ def cast(world: World, history: History, spec: LidarSpec, times_ns: NDArray[np.i
     parts = []
     for piece in np.array_split(np.arange(spec.beams), _PIECES if world.has_walkers else 1):
         world.move_walkers(float(times_ns[piece].mean()) / 1e9)
-        parts.append(world.returns(starts[piece], rays[piece], reach_m))
-    distances, cosines, numbers = (
+        parts.append(world.returns(starts[piece], rays[piece], reach_m, spec.glass_deg))
+    distances, cosines, numbers, passed = (
         np.concatenate(columns)
-        for columns in zip(*((part.distances_m, part.cosines, part.name_of) for part in parts), strict=True)
+        for columns in zip(
+            *((part.distances_m, part.cosines, part.name_of, part.passed) for part in parts), strict=True
+        )
     )
-    return Returns(distances, cosines, parts[0].names, numbers)
+    return Returns(distances, cosines, parts[0].names, numbers, passed)
 
 
 def noisy(distances: Floats, spec: LidarSpec, rng: np.random.Generator) -> Floats:

@@ -17,11 +17,21 @@ Floats = NDArray[np.float64]
 
 POINTS = Channel("/points", RingCloud)
 RINGS_FRAME = "ring_lidar"
-_REFLECTIVITY = {"stop sign": 1.0, "reflector": 3.0, "car": 0.7, "traffic light": 0.5, "tree": 0.35, "": 0.25}
+_REFLECTIVITY = {
+    "stop sign": 1.0,
+    "reflector": 3.0,
+    "glass": 1.0,
+    "car": 0.7,
+    "traffic light": 0.5,
+    "tree": 0.35,
+    "": 0.25,
+}
 _OTHERWISE = 0.45
 """Share of the light at 905 nm that comes back from straight ahead: a road sign's reflecting sheet all of what the
 receiver can tell (it saturates), a reflector's at any angle, paint more than cloth, asphalt (the ground, without a
 name) about a quarter."""
+_THROUGH = 0.96**2
+"""Share of the light that is left after a surface of glass, there and back: each reflects 4 % (Fresnel, index 1.5)."""
 _EDGE_M = 0.3
 """Neighbouring beams of a ring whose ranges differ by more lie on both sides of an edge."""
 _RAIN_M = 4.0
@@ -90,7 +100,7 @@ def cast_rings(
     reach_m = spec.range_max_m + 4 * spec.sigma_m
     rays = rotate(orientations, unit.reshape(-1, 3))
     world.move_walkers(float(times_ns.mean()) / 1e9)
-    return world.returns(starts, rays, reach_m)
+    return world.returns(starts, rays, reach_m, spec.glass_deg)
 
 
 def _measured(distances: Floats, spec: RingLidarSpec, rng: np.random.Generator) -> Floats:
@@ -118,4 +128,4 @@ def _measured(distances: Floats, spec: RingLidarSpec, rng: np.random.Generator) 
 def intensities_of(returns: Returns) -> Floats:
     """Intensities (N,) of 255 as the receiver gives them, distance taken out: material times cosine of the angle."""
     material = np.array([_REFLECTIVITY.get(name, _OTHERWISE) for name in returns.names])[returns.name_of]
-    return 255 * np.clip(material * returns.cosines, 0.0, 1.0)
+    return 255 * np.clip(material * returns.cosines * _THROUGH**returns.passed, 0.0, 1.0)

@@ -130,6 +130,8 @@ class LidarSpec(SensorSpec):
     """Standard deviation of a range."""
     dropout: Share = 0.002
     """Share of beams that return nothing."""
+    glass_deg: Annotated[float, Field(ge=0, le=90)] = 5.0
+    """Glass returns beams that meet it within so many degrees of straight on; others go through it."""
     instantaneous: bool = False
     """All beams at the time of the first one, as Gazebo does."""
     intensities: bool = False
@@ -168,6 +170,8 @@ class RingLidarSpec(SensorSpec):
     """Standard deviation of a range."""
     dropout: Share = 0.002
     """Share of beams that return nothing."""
+    glass_deg: Annotated[float, Field(ge=0, le=90)] = 5.0
+    """Glass returns beams that meet it within so many degrees of straight on; others go through it."""
     divergence_mrad: NotNegative = 3.0
     """Width of a beam: where it meets an edge it measures something in between (mixed pixels)."""
     rain: Share = 0.0

@@ -16,6 +16,10 @@ Floats = NDArray[np.float64]
 
 STEP_NS = 4_000_000
 """Physics runs at 250 Hz."""
+_MOST_SURFACES = 8
+"""So many surfaces of glass a ray is followed through: both of four panes."""
+_BEHIND_M = 1e-3
+"""So far behind a surface of glass a ray is taken up again; panes are thicker."""
 _MOST_RAYS = 16_384
 """So many rays PyBullet takes at once (MAX_RAY_INTERSECTION_BATCH_SIZE)."""
 
@@ -23,12 +27,14 @@ _MOST_RAYS = 16_384
 @dataclass(frozen=True, slots=True, eq=False)
 class Returns:
     """What N rays meet first: distances_m (N,), infinite for nothing; cosines (N,) of the angle to the normal there;
-    `names` of classes, empty for the ground, and per ray the number (N,) of its own among them."""
+    `names` of classes, empty for the ground, and per ray the number (N,) of its own among them, and of surfaces (N,) of
+    glass that it went through before."""
 
     distances_m: Floats
     cosines: Floats
     names: tuple[str, ...]
     name_of: NDArray[np.int64]
+    passed: NDArray[np.int64]
 
 
 class World:
@@ -44,10 +50,13 @@ class World:
         ground = pybullet.createMultiBody(0, plane, physicsClientId=self._client)
         pybullet.changeDynamics(ground, -1, lateralFriction=1.0, physicsClientId=self._client)
         self._object_of_body: dict[int, PlacedObject] = {}
+        self._panes: list[int] = []
         self._walkers: list[tuple[PlacedObject, list[int]]] = []
         for placed in objects:
             x, y, heading = placed.pose_at(0.0)
-            bodies = [body.body_id for body in self._store.spawn(placed.asset, (x, y, 0.0), heading)]
+            spawned = self._store.spawn(placed.asset, (x, y, 0.0), heading)
+            bodies = [body.body_id for body in spawned]
+            self._panes += [body.body_id for body in spawned if body.clear]
             self._object_of_body.update(dict.fromkeys(bodies, placed))
             if placed.moves:
                 self._walkers.append((placed, bodies))
@@ -82,9 +91,30 @@ class World:
         bodies = self.robot.touching() & self._object_of_body.keys()
         return {self._object_of_body[body].object_id for body in bodies}
 
-    def returns(self, starts: Floats, directions: Floats, reach_m: float) -> Returns:
-        """What rays from `starts` (N, 3) along unit vectors `directions` (N, 3) meet in reach, but for the robot."""
-        ends = starts + reach_m * directions
+    def returns(self, starts: Floats, directions: Floats, reach_m: float, glass_deg: float = 90.0) -> Returns:
+        """What rays from `starts` (N, 3) along unit vectors `directions` (N, 3) meet in reach, but for the robot.
+
+        Glass returns rays that meet it within `glass_deg` of straight on; others go through as if it were not there.
+        """
+        distances, cosines, bodies = self._hits(starts, directions, np.full(len(starts), reach_m))
+        passed = np.zeros(len(starts), dtype=np.int64)
+        for _ in range(_MOST_SURFACES if self._panes else 0):
+            through = np.isin(bodies, self._panes) & (cosines < np.cos(np.deg2rad(glass_deg)))
+            if not through.any():
+                break
+            begun = distances[through] + _BEHIND_M
+            further = starts[through] + begun[:, None] * directions[through]
+            found = self._hits(further, directions[through], reach_m - begun)
+            distances[through], cosines[through], bodies[through] = begun + found[0], found[1], found[2]
+            passed[through] += 1
+        names = ("", *sorted({placed.asset.name for placed in self._object_of_body.values()}))
+        number = {body: names.index(placed.asset.name) for body, placed in self._object_of_body.items()}
+        name_of = np.array([number.get(body, 0) for body in bodies.tolist()], dtype=np.int64)
+        return Returns(distances, cosines, names, name_of, passed)
+
+    def _hits(self, starts: Floats, directions: Floats, reach_m: Floats) -> tuple[Floats, Floats, NDArray[np.int64]]:
+        """Distances (N,), cosines of the angles to the normals (N,) and bodies (N,) that rays meet in reach (N,)."""
+        ends = starts + reach_m[:, None] * directions
         hits = []
         for first in range(0, len(starts), _MOST_RAYS):
             part = slice(first, first + _MOST_RAYS)
@@ -95,13 +125,7 @@ class World:
                 collisionFilterMask=STATIC_GROUP,
                 physicsClientId=self._client,
             )
-        share, bodies = np.array([hit[2] for hit in hits]), [hit[0] for hit in hits]
+        share = np.array([hit[2] for hit in hits])
         normals = np.array([hit[4] for hit in hits]).reshape(-1, 3)
-        names = ("", *sorted({placed.asset.name for placed in self._object_of_body.values()}))
-        number = {body: names.index(placed.asset.name) for body, placed in self._object_of_body.items()}
-        return Returns(
-            np.where(share < 1.0, share * reach_m, np.inf),
-            np.abs((normals * directions).sum(axis=1)),
-            names,
-            np.array([number.get(body, 0) for body in bodies], dtype=np.int64),
-        )
+        distances = np.where(share < 1.0, share * reach_m, np.inf)
+        return distances, np.abs((normals * directions).sum(axis=1)), np.array([hit[0] for hit in hits], dtype=np.int64)

@@ -1,7 +1,7 @@
 """What the catalog hands out: assets made of textured parts, and how solids and pictures become them."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,8 @@ from mcap_landmarks_generator.assets.solid import Floats, Ints, Solid, shade
 from mcap_landmarks_generator.assets.texture import Image
 
 ATLAS_WIDTH_PX = 256
+CLEAR = "clear"
+"""The material of glass."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,7 +21,7 @@ class Part:
 
     `vertices` (N,3) in metres, `uv` (N,2) in 0..1 (v up: the texture's first row is v = 1), `normals` (N,3) of unit
     length, `faces` (M,3) counter-clockwise seen from outside, `texture` (H,W,3) RGB. `labelled` is False for what COCO
-    does not count as the object, such as a sign's pole.
+    does not count as the object, such as a sign's pole. A `clear` one is glass: it is not drawn and throws no shadow.
     """
 
     vertices: Floats
@@ -28,6 +30,7 @@ class Part:
     faces: Ints
     texture: Image
     labelled: bool
+    clear: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,13 +80,16 @@ class AssetClass:
 
 
 def assemble(solids: Sequence[Solid], pictures: Mapping[str, Image]) -> tuple[Part, ...]:
-    """Parts from solids and the pictures of their materials: the labelled solids as one part, the others as another."""
+    """Parts from solids and the pictures of their materials: one of labelled solids, of others, and of glass."""
     atlas, places = _atlas(pictures)
     parts = []
+    opaque, glass = ([solid for solid in solids if (solid.material == CLEAR) == clear] for clear in (False, True))
     for labelled in (True, False):
-        chosen = [solid for solid in solids if solid.labelled == labelled]
+        chosen = [solid for solid in opaque if solid.labelled == labelled]
         if chosen:
             parts.append(_joined(chosen, atlas, places, labelled))
+    if glass:
+        parts.append(replace(_joined(glass, atlas, places, False), clear=True))
     return tuple(parts)
 
 

@@ -14,13 +14,18 @@ from mcap_landmarks_generator.assets.asset import Asset, Part
 from mcap_landmarks_generator.assets.texture import Image
 from mcap_landmarks_generator.engine import pybullet
 
+_NOTHING = -1
+"""PyBullet's handle of no shape."""
+
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A body in the world; `labelled` as in its part: only these count for the object's box in the image."""
+    """A body in the world; `labelled` as in its part: only these count for the object's box in the image; `clear`: it
+    is glass."""
 
     body_id: int
     labelled: bool
+    clear: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +36,7 @@ class _Shapes:
     collision: int
     texture: int
     labelled: bool
+    clear: bool
 
 
 class AssetStore:
@@ -65,8 +71,9 @@ class AssetStore:
             body = pybullet.createMultiBody(
                 0, shapes.collision, shapes.visual, place, turn, physicsClientId=self._client
             )
-            pybullet.changeVisualShape(body, -1, textureUniqueId=shapes.texture, physicsClientId=self._client)
-            bodies.append(Body(body, shapes.labelled))
+            if not shapes.clear:
+                pybullet.changeVisualShape(body, -1, textureUniqueId=shapes.texture, physicsClientId=self._client)
+            bodies.append(Body(body, shapes.labelled, shapes.clear))
         return tuple(bodies)
 
     def _texture(self, image: Image) -> int:
@@ -106,5 +113,6 @@ class AssetStore:
                 flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
                 physicsClientId=self._client,
             )
-            shapes.append(_Shapes(self._visual(part), collision, textures[id(part.texture)], part.labelled))
+            visual = _NOTHING if part.clear else self._visual(part)
+            shapes.append(_Shapes(visual, collision, textures[id(part.texture)], part.labelled, part.clear))
         return tuple(shapes)

@@ -53,7 +53,7 @@ def cast_shadow(asset: Asset, yaw_rad: float, towards_light: ArrayLike) -> Shado
     light = np.asarray(towards_light, float) / np.linalg.norm(towards_light)
     slope = light[:2] / max(light[2], LOWEST_LIGHT)
     turn = rotation((0, 0, 1), yaw_rad)
-    meshes = [(part.vertices @ turn.T, part.faces) for part in asset.parts]
+    meshes = [(part.vertices @ turn.T, part.faces) for part in asset.parts if not part.clear]
     flat = [(points[:, :2] - points[:, 2:] * slope, faces) for points, faces in meshes]
     margin = 3 * BLUR_M
     low = np.min([points.min(axis=0) for points, _ in flat], axis=0) - margin

@@ -44,7 +44,7 @@ def digest(asset: Asset) -> str:
 def test_classes_distractors_and_structures() -> None:
     assert set(catalog.CLASSES) == set(HEIGHT_M)
     assert set(catalog.DISTRACTORS) == {"cone", "barrel", "box", "bollard", "tree", "table", "pole"}
-    assert set(catalog.STRUCTURES) == {"kerb", "facade", "hedge", "bank", "shelving", "reflector", "tag"}
+    assert set(catalog.STRUCTURES) == {"kerb", "facade", "hedge", "bank", "shelving", "reflector", "tag", "glass"}
     assert catalog.COCO_ID["stop sign"] == 11
     assert catalog.COCO_ID["potted plant"] == 58
     assert len(set(catalog.COCO_ID.values())) == 12
