@@ -19,15 +19,17 @@ from mcap_landmarks_generator.lidar import beam_angles
 from mcap_landmarks_generator.loading import load_scenario
 from mcap_landmarks_generator.optics import Optics
 from mcap_landmarks_generator.renderer import Renderer
+from mcap_landmarks_generator.ring_cloud import RingCloud
 from mcap_landmarks_generator.robot import SCAN_IN_BASE_M
 from mcap_landmarks_generator.simulation import Simulation
 from mcap_landmarks_generator.trajectory import legs_of
 
 Floats = NDArray[np.float64]
 
-_FOLDER = Path(__file__).parent / "images"
+_FOLDER = Path(__file__).parents[1] / "images"
 _WAY, _BEAM, _FIELD = (255, 200, 0), (255, 60, 40), (40, 160, 255)
 _FULL_TURN_DEG = 360
+_PLACES = ("street", "campus", "warehouse", "seasons")
 
 
 def make_all() -> None:
@@ -40,6 +42,8 @@ def make_all() -> None:
     for name in sorted(bundled()):
         if not name.endswith("_drift"):
             _write(name, first_good_image(stage(load_scenario(name))))
+    for name in _PLACES:
+        _write(f"{name}_lidar", returns_from_above(stage(load_scenario(name))))
 
 
 def top_view(staged: Staged, width_px: int, side_m: float) -> Image:
@@ -86,6 +90,36 @@ def lidar_field(staged: Staged, width_px: int, side_m: float) -> Image:
     circle = np.linspace(0, 2 * np.pi, _FULL_TURN_DEG)
     _line(image, pixel_from(lidar + spec.range_max_m * np.stack([np.cos(circle), np.sin(circle)], axis=1)), _FIELD)
     cv2.circle(image, _whole(pixel_from(lidar[None])[0]), 6, _WAY, -1, cv2.LINE_AA)
+    return image
+
+
+def returns_from_above(staged: Staged, after_s: float = 8.0, size_px: tuple[int, int] = (640, 480)) -> Image:
+    """What the LiDAR of most rings meets in one turn, seen from above, ahead to the right: colours tell heights from
+    the ground (blue) to 3 m, of a planar LiDAR intensities, if it has any."""
+    rings = staged.scenario.ring_lidar
+    wanted, reach_m = (RingCloud, 32.0) if rings is not None else (LaserScan, staged.scenario.lidar.range_max_m)
+    message = next(
+        event.message
+        for event in Simulation(staged).run()
+        if isinstance(event, Stamped)
+        and isinstance(event.message, wanted)
+        and event.log_time_ns > staged.scenario.start_ns + after_s * 1e9
+    )
+    if isinstance(message, RingCloud) and rings is not None:
+        points, shades = message.points_m[:, :2], (message.points_m[:, 2] + rings.height_m) / 3.0
+    elif isinstance(message, LaserScan):
+        seen, angles = np.isfinite(message.ranges_m), beam_angles(staged.scenario.lidar)
+        ahead = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        points = (message.ranges_m[:, None] * ahead)[seen]
+        shades = message.intensities[seen] / 255 if len(message.intensities) else np.full(len(points), 0.5)
+    shades = np.rint(255 * np.clip(shades, 0.0, 1.0)).astype(np.uint8)
+    colours = cv2.applyColorMap(shades[:, None], cv2.COLORMAP_TURBO)[:, 0, ::-1]
+    image = np.zeros((size_px[1], size_px[0], 3), np.uint8)
+    scale = size_px[0] / (2 * reach_m)
+    pixels = np.rint(np.array(size_px) / 2 + points * (scale, -scale)).astype(int)
+    for pixel, colour in zip(pixels, colours, strict=True):
+        cv2.circle(image, (int(pixel[0]), int(pixel[1])), 1, colour.tolist(), -1)
+    cv2.circle(image, (size_px[0] // 2, size_px[1] // 2), 4, (255, 255, 255), -1, cv2.LINE_AA)
     return image
 
 

@@ -25,6 +25,7 @@ class SdfModel:
 
     `solid` is the first of its collision shapes (box, cylinder, mesh, ...) with its size in m, as far as SDF gives one.
     `way_xy` are the points (N, 2) that an actor walks to, and `walks_s` how long that takes.
+    `is_scattered` says that it is a population, whose members Gazebo scatters.
     """
 
     name: str
@@ -34,6 +35,7 @@ class SdfModel:
     size_m: tuple[float, ...] = ()
     way_xy: Pose = field(default_factory=lambda: np.zeros((0, 2)))
     walks_s: float = 0.0
+    is_scattered: bool = False
 
     @property
     def heading_rad(self) -> float:
@@ -114,6 +116,8 @@ def _models_in(scope: _Scope, saved: Mapping[str, Pose], depth: int) -> Iterator
     for element in scope.element:
         if element.tag == "actor":
             yield _actor(element, scope.pose_of(element))
+        if element.tag == "population":
+            yield SdfModel(element.get("name") or "population", "", scope.pose_of(element), is_scattered=True)
         if element.tag not in {"model", "include"}:
             continue
         name = _name(element)

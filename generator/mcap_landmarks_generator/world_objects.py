@@ -16,12 +16,16 @@ from mcap_landmarks_generator.sdf_world import SdfModel
 
 _BY_WORD = {
     "barrier": "box", "bike": "bicycle", "cardboard": "box", "casual": "person", "crate": "box", "cube": "box",
+    "desk": "table",
     "drum": "barrel", "hatchback": "car", "hydrant": "fire hydrant", "lamp": "pole", "light": "pole", "oak": "tree",
     "pallet": "box", "pedestrian": "person", "pickup": "car", "pine": "tree", "plant": "potted plant", "post": "pole",
     "prius": "car", "shelf": "box", "suv": "car", "trash": "barrel", "visitor": "person", "walker": "person",
 }  # fmt: skip
 """Words in the names of models of Gazebo's public collections that are no names of classes here."""
-_NO_OBJECTS = {"sun", "ground plane", "asphalt plane", "ground", "floor"}
+_NO_OBJECTS = {"asphalt", "ceiling", "floor", "ground", "roof", "sun"}
+"""Words in the names of models that are no objects."""
+_HANGS_M = 2.0
+"""A model whose origin is higher hangs from a ceiling; that of one that stands is at its foot or in its middle."""
 _SPEED_MPS = 1.2
 """Of one who walks in no time, as a script without times has it."""
 
@@ -43,9 +47,13 @@ def objects_of(models: Sequence[SdfModel], classes: Mapping[str, str]) -> WorldO
     """
     objects: list[tuple[str, ObjectSpec]] = []
     stand_ins: list[tuple[str, ObjectSpec]] = []
+    hanging = list[str]()
     for number, model in enumerate(models):
         found = _class_of(model, classes)
-        if found == "" or (not found and model.solid == "plane"):
+        if found == "" or model.is_scattered or (not found and model.solid == "plane"):
+            continue
+        if model.world_from_model[2, 3] > _HANGS_M:
+            hanging.append(model.name)
             continue
         spec = _spec(model, found or _by_shape(model), look=number)
         if found:
@@ -61,29 +69,38 @@ def objects_of(models: Sequence[SdfModel], classes: Mapping[str, str]) -> WorldO
         )
     if inside:
         warnings.append(f"{_named(inside)}: left out, since what stands for them would be inside another object")
+    if hanging:
+        warnings.append(f"{_named(hanging)}: left out, since they hang more than {_HANGS_M:g} m above the ground")
+    scattered = [model.name for model in models if model.is_scattered]
+    if scattered:
+        warnings.append(f"{_named(scattered)}: left out, since Gazebo scatters the members of a population")
     all_ = [*objects, *kept]
     return WorldObjects(tuple(map(itemgetter(1), all_)), tuple(map(itemgetter(0), all_)), tuple(warnings))
 
 
 def _class_of(model: SdfModel, classes: Mapping[str, str]) -> str | None:
     """A class or distractor; empty for what is no object, None for what is of no class."""
-    names = [name.lower() for name in (model.name, model.uri) if name]
+    names = [name for name in (model.name, model.uri) if name]
     for pattern, class_name in classes.items():
-        if any(fnmatchcase(name, pattern.lower()) for name in names):
+        if any(fnmatchcase(name.lower(), pattern.lower()) for name in names):
             return class_name
-    told = [_told_by(re.sub(r"[^a-z]+", " ", name).split()) for name in names]
+    told = [_told_by(_words(name)) for name in names]
     return next((class_name for class_name in told if class_name is not None), None)
+
+
+def _words(name: str) -> list[str]:
+    """The words of a name, in small letters: of `TrashCanC_01` trash, can and c."""
+    return re.sub(r"[^a-z]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()).split()
 
 
 def _told_by(words: Sequence[str]) -> str | None:
     """What the words of a name say, as `_class_of` tells it; of two classes in a name the longer one is meant."""
     name = " ".join(words)
-    if name in _NO_OBJECTS:
-        return ""
-    known = [one for one in (*catalog.CLASSES, *catalog.DISTRACTORS) if f" {one} " in f" {name} "]
+    known = [one for one in (*catalog.CLASSES, *catalog.DISTRACTORS, *catalog.STRUCTURES) if f" {one} " in f" {name} "]
     if known:
         return max(known, key=len)
-    return next((_BY_WORD[word] for word in words if word in _BY_WORD), None)
+    by_word = next((_BY_WORD[word] for word in words if word in _BY_WORD), None)
+    return "" if by_word is None and not _NO_OBJECTS.isdisjoint(words) else by_word
 
 
 def _by_shape(model: SdfModel) -> str:

@@ -8,6 +8,7 @@ from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks_generator.checks import stage
 from mcap_landmarks_generator.loading import effective, load_scenario
 from mcap_landmarks_generator.sdf_world import SdfModel, read_world
+from mcap_landmarks_generator.world_objects import objects_of
 
 WORLDS = Path(__file__).parent / "worlds"
 
@@ -85,6 +86,47 @@ def test_the_world_stands_in_for_the_objects_of_a_scenario() -> None:
     assert [spec.class_name for spec in staged.scenario.objects] == ["car", "fire hydrant", "person"]
     assert walker.speed_mps == pytest.approx(1.6)
     assert staged.warnings == ()
+
+
+def classes_of(file: str) -> tuple[dict[str, str], tuple[str, ...]]:
+    found = objects_of(read_world(WORLDS / file), {})
+    return dict(zip(found.models, (spec.class_name for spec in found.objects), strict=True)), found.warnings
+
+
+def test_a_store_whose_models_have_names_in_mixed_case() -> None:
+    """Words begin with capitals, lamps hang from the ceiling, and ground and roof are no objects."""
+    classes, warnings = classes_of("store.world")
+    assert {name.removeprefix("vendor_robot_store_"): one for name, one in classes.items()} == {
+        "ShelfF_01": "box",
+        "ShelfE_01": "box",
+        "TrashCanC_01": "barrel",
+        "PalletJackB_01": "box",
+        "DeskC_01": "table",
+        "WallB_01": "box",
+    }
+    assert len(warnings) == 2
+    assert warnings[0].startswith("vendor_robot_store_WallB_01: of no class")
+    assert warnings[1] == "vendor_robot_store_Lamp_01: left out, since they hang more than 2 m above the ground"
+
+
+def test_a_block_of_a_city() -> None:
+    classes, warnings = classes_of("block.sdf")
+    assert classes == {
+        "stop_sign": "stop sign",
+        "lamp_post": "pole",
+        "hydrant": "fire hydrant",
+        "parked": "car",
+        "hatch": "car",
+        "cone_0": "cone",
+        "drum": "barrel",
+        "oak_tree": "tree",
+        "pedestrian": "person",
+        "house_1_0": "box",
+        "mailbox": "box",
+    }
+    assert len(warnings) == 2
+    assert warnings[0].startswith("house_1_0, mailbox: of no class")
+    assert warnings[1] == "crowd: left out, since Gazebo scatters the members of a population"
 
 
 CRATE = "<include><name>{}</name><uri>model://crate</uri><pose>{} 5 0 0 0 0</pose></include>"
