@@ -26,6 +26,10 @@ _NO_OBJECTS = {"asphalt", "ceiling", "floor", "ground", "roof", "sun"}
 """Words in the names of models that are no objects."""
 _HANGS_M = 2.0
 """A model whose origin is higher hangs from a ceiling; that of one that stands is at its foot or in its middle."""
+_OF_NO_CLASS = (
+    "of no class, so that they stand as distractors; name their classes in the scenario, as in "
+    '[world] classes = { "shelf_*" = "box" }'
+)
 _SPEED_MPS = 1.2
 """Of one who walks in no time, as a script without times has it."""
 
@@ -47,35 +51,39 @@ def objects_of(models: Sequence[SdfModel], classes: Mapping[str, str]) -> WorldO
     """
     objects: list[tuple[str, ObjectSpec]] = []
     stand_ins: list[tuple[str, ObjectSpec]] = []
-    hanging = list[str]()
     for number, model in enumerate(models):
         found = _class_of(model, classes)
-        if found == "" or model.is_scattered or (not found and model.solid == "plane"):
-            continue
-        if model.world_from_model[2, 3] > _HANGS_M:
-            hanging.append(model.name)
-            continue
-        spec = _spec(model, found or _by_shape(model), look=number)
         if found:
-            objects.append((model.name, spec))
-        else:
-            stand_ins.append((model.name, spec))
+            objects += [(model.name, _spec(model, found, look=number))] if _stands(model) else []
+        elif found is None and model.solid != "plane" and _stands(model):
+            stand_ins.append((model.name, _spec(model, _by_shape(model), look=number)))
     kept, inside = _apart(objects, stand_ins)
-    warnings = []
-    if stand_ins:
-        warnings.append(
-            f"{_named([name for name, _ in stand_ins])}: of no class, so that they stand as distractors; name their "
-            'classes in the scenario, as in [world] classes = { "shelf_*" = "box" }'
-        )
-    if inside:
-        warnings.append(f"{_named(inside)}: left out, since what stands for them would be inside another object")
-    if hanging:
-        warnings.append(f"{_named(hanging)}: left out, since they hang more than {_HANGS_M:g} m above the ground")
-    scattered = [model.name for model in models if model.is_scattered]
-    if scattered:
-        warnings.append(f"{_named(scattered)}: left out, since Gazebo scatters the members of a population")
     all_ = [*objects, *kept]
-    return WorldObjects(tuple(map(itemgetter(1), all_)), tuple(map(itemgetter(0), all_)), tuple(warnings))
+    warnings = _warnings([name for name, _ in stand_ins], inside, models, classes)
+    return WorldObjects(tuple(map(itemgetter(1), all_)), tuple(map(itemgetter(0), all_)), warnings)
+
+
+def _stands(model: SdfModel) -> bool:
+    return not (model.is_scattered or _hangs(model))
+
+
+def _hangs(model: SdfModel) -> bool:
+    return bool(model.world_from_model[2, 3] > _HANGS_M)
+
+
+def _warnings(
+    stand_ins: Sequence[str], inside: Sequence[str], models: Sequence[SdfModel], classes: Mapping[str, str]
+) -> tuple[str, ...]:
+    """What is not as in the world, one line for each reason."""
+    hanging = [model.name for model in models if _hangs(model) and _class_of(model, classes) != ""]
+    scattered = [model.name for model in models if model.is_scattered]
+    reasons = (
+        (stand_ins, _OF_NO_CLASS),
+        (inside, "left out, since what stands for them would be inside another object"),
+        (hanging, f"left out, since they hang more than {_HANGS_M:g} m above the ground"),
+        (scattered, "left out, since Gazebo scatters the members of a population"),
+    )
+    return tuple(f"{_named(names)}: {why}" for names, why in reasons if names)
 
 
 def _class_of(model: SdfModel, classes: Mapping[str, str]) -> str | None:
