@@ -10,12 +10,13 @@ import pytest
 from mcap_landmarks.channels import ODOMETRY
 from mcap_landmarks.cli.batch_events import EventLines
 from mcap_landmarks.cli.batch_options import BatchOptions
-from mcap_landmarks.cli.batch_reports import Report
+from mcap_landmarks.cli.batch_reports import Report, say_pace
 from mcap_landmarks.cli.batch_run import run_batch
 from mcap_landmarks.cli.batch_table import LiveTable
 from mcap_landmarks.cli.batch_tasks import tasks_of
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.fleet.cuts import over_memory
+from mcap_landmarks.fleet.recorded_hours import recorded_hours
 from mcap_landmarks.fleet.tasks import Ended, Started, Task, TaskLimits
 from mcap_landmarks.recording.reader import open_recording
 
@@ -81,7 +82,9 @@ def test_one_that_fails_does_not_stop_the_others(
     assert [event["event"] for event in told if "hangs" in event["log"]] == ["started", "retried", "ended"]
 
     assert call("batch", "localize", *(folder / "logs" / f"{name}.mcap" for name in ("a", "b")), *words) == 0
-    assert "2 skipped" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "2 skipped" in printed
+    assert "hours of recording" not in printed, "nothing was worked on"
 
 
 @pytest.mark.slow
@@ -139,7 +142,10 @@ def test_wrong_usage_runs_nothing(folder: Path, tmp_path: Path, capsys: pytest.C
         (("batch", "localize", log), "Missing option '--map'"),
         (("batch", "localize", "--map", "x.db"), "name the logs, a quoted pattern"),
         (("batch", "map", log, "--from-reference"), "--from-reference is for one log, and batch map has many"),
-        (("batch", "detect", log, "--segments", "5"), "--segments is for one log"),
+        (
+            ("batch", "detect", log, "--segments", "5"),
+            "batch detect has many; leave it out, as --workers logs",
+        ),
         (("batch", "evaluate", log, "--tum", "x.tum"), "--tum names one file"),
         (("batch", "evaluate", tmp_path / "*.mcap"), "no file matches"),
         (("batch", "evaluate", log, "--time-limit", 0), "--time-limit 0.0: give seconds, more than none"),
@@ -168,6 +174,13 @@ def test_wrong_usage_runs_nothing(folder: Path, tmp_path: Path, capsys: pytest.C
         ("localize", "[options]\nhelp = true", "[options]: help: --help is no option of localize"),
         ("localize", '[options]\nmap = "no.db"', "[options]: map = 'no.db': there is no such file"),
         ("localize", 'options.start = "noon"', "[[log]] 1: options.start = noon: give RFC 3339"),
+        ("localize", 'options.image-rate = "x"', "[[log]] 1: options.image-rate: no value of --image-rate; see"),
+        ("localize", 'options.set = ["detect.confidence=x"]', "[[log]] 1: options.set: detect.confidence = 'x'"),
+        (
+            "localize",
+            'options.model = "nonet"',
+            "[[log]] 1: options.model: --model nonet: neither a file",
+        ),
         ("map", 'options.prior = "no.db"', "[[log]] 1: options.prior = 'no.db': there is no such file"),
     ],
 )
@@ -185,10 +198,13 @@ def test_a_manifest_is_refused_by_file_table_and_key(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.usefixtures("cached_network")
 def test_files_and_folders_that_no_worker_could_read_are_refused_at_once(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Names of networks are no files, and bags are logs."""
+    config = tmp_path / "site.toml"
+    config.write_text('[detect]\nmodel = "no.onnx"\n')
     log, bag = tmp_path / "logs" / "a.mcap", tmp_path / "bag"
     log.parent.mkdir()
     bag.mkdir()
@@ -199,6 +215,10 @@ def test_files_and_folders_that_no_worker_could_read_are_refused_at_once(
     for given, reason in (
         ((log, "--map", "no.db"), "error: --map no.db: there is no such file"),
         ((log, *words, "--model", "no.onnx"), "error: --model no.onnx: there is no such file"),
+        ((log, *words, "--model", "nonet"), "error: --model nonet: neither a file nor a network here"),
+        ((log, *words, "--set", "detect.model=no.onnx"), "--set: detect.model = 'no.onnx': there is no such file"),
+        ((log, *words, "--config", config), f"{config}: detect.model = 'no.onnx': there is no such file"),
+        ((log, *words, "--set", "detect.confidense=1"), "confidense is no setting of detect"),
         ((log, *words, "--start", "noon"), "error: --start noon: give RFC 3339"),
         ((log.parent, *words), f"logs is a folder of recordings; name them: '{log.parent}/*.mcap'"),
         ((log,), "Try 'mcap-landmarks localize --help'"),
@@ -262,6 +282,15 @@ def test_events_are_lines_that_are_there_at_once(tmp_path: Path) -> None:
         ("retried", 8),
         ("ended", None),
     ]
+
+
+def test_the_pace_is_told_in_hours_of_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, none = write(tmp_path / "a.mcap", messages(count=61)), tmp_path / "none.mcap"
+    none.touch()
+    whole, part = Task(log, none, ("cluster",)), Task(log, none, ("cluster", "--end=1"))
+    assert recorded_hours([whole, whole, part, Task(none, log, ("cluster",))]) * 3600 == pytest.approx(60.0)
+    say_pace(2.0, 1800.0)
+    assert capsys.readouterr().out == "2.00 hours of recording in 0.50 hours: 4.0 an hour\n"
 
 
 class Stopped:

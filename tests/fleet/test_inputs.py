@@ -102,6 +102,10 @@ def test_a_manifest_gives_each_log_its_options(tmp_path: Path) -> None:
         ('[[log]]\npath = "a"\nend = 2026-01-31T12:00:00', "[[log]] 1: end = 2026-01-31T12:00:00: give RFC 3339 with"),
         ('[[log]]\npath = "*.mcap"', "/*.mcap': patterns are for the command line; list each log"),
         ('[[log]]\npath = "s3://bucket/*"', "[[log]] 1: path = 's3://bucket/*': patterns are for the command line"),
+        (
+            '[[log]]\npath = "s3://bucket/logs/"',
+            "path = 's3://bucket/logs/': prefixes are for the command line",
+        ),
         ('[[log]]\npath = "none.mcap"', "/none.mcap': there is no such file; name it from the manifest's folder"),
         ('[[log]]\npath = "a"\n[log.options]\nset = { a = 1 }', "[[log]] 1: options.set = {'a': 1}: give a table of"),
     ],

@@ -67,6 +67,13 @@ def test_a_file_that_changes_is_refused_by_the_store(bucket: Bucket) -> None:
             list(recording.messages())
 
 
+@pytest.mark.parametrize(("scheme", "name"), [("gs", "bucket"), ("az", "container")])
+def test_a_bucket_is_called_what_its_store_calls_it(scheme: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("mcap_landmarks.remote.stored_file.store", lambda _text: (None, "here"))
+    with pytest.raises(RemoteError, match=f"{scheme}://here: names a {name}, not a file; name a file, as {scheme}://"):
+        location(f"{scheme}://here").open("rb")
+
+
 def test_what_is_not_there_is_named(bucket: Bucket) -> None:
     bucket.write("folder/a.mcap", b"a")
     for url, problem in (
@@ -136,7 +143,7 @@ def test_prefixes_and_patterns_name_files_by_name(bucket: Bucket) -> None:
     assert found("day/a.mcap") == ["day/a.mcap"]
     assert is_folder(location(bucket.url("day")))
     assert not is_folder(location(bucket.url("day/a.mcap")))
-    with pytest.raises(RemoteError, match="there is no such file, and none below it; check the URL"):
+    with pytest.raises(UsageError, match="there is no such file, and none below it; check the URL"):
         found("dawn")
     with pytest.raises(UsageError, match=r"\*\.bag: no file matches; quote the pattern and check the folder"):
         found("day/*.bag")

@@ -162,8 +162,8 @@ def matching(place: Location) -> list[Location]:
     """What a pattern (`**` is any depth) or a URL's prefix names, sorted by name; what is there is named by itself.
 
     Raises:
-        UsageError: a pattern that no path fits; or see `Url.open`.
-        RemoteError: there is no such file elsewhere, nor any below it.
+        UsageError: nothing of that name is there; or see `Url.open`.
+        RemoteError: it cannot be listed.
     """
     if isinstance(place, Url):
         from mcap_landmarks.remote.store_listing import urls_matching  # noqa: PLC0415 # not loaded for paths

@@ -1,5 +1,6 @@
 """Run a verb over many logs, with workers that outlast what becomes of a log."""
 
+import time
 from typing import Annotated
 
 import typer
@@ -7,7 +8,7 @@ import typer
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.batch_map import map_logs
 from mcap_landmarks.cli.batch_options import BatchOptions
-from mcap_landmarks.cli.batch_reports import counts_of, print_reports, say_errors
+from mcap_landmarks.cli.batch_reports import counts_of, print_reports, say_errors, say_pace
 from mcap_landmarks.cli.batch_tasks import VERBS, tasks_of
 from mcap_landmarks.cli.console import PARTIAL, UNUSABLE, say_json, warn
 from mcap_landmarks.errors import UsageError
@@ -41,6 +42,7 @@ def command(
     from mcap_landmarks.cli.batch_events import event_lines
     from mcap_landmarks.cli.batch_run import run_batch
     from mcap_landmarks.cli.batch_table import live_table
+    from mcap_landmarks.fleet.recorded_hours import recorded_hours
     from mcap_landmarks.runs.outputs import no_empty_folder
 
     if batch.prints_events and json:
@@ -51,13 +53,14 @@ def command(
         return
     limits = batch.limits()
     with no_empty_folder(output):
-        tasks = tasks_of(verb, words, output)
+        tasks, began = tasks_of(verb, words, output), time.monotonic()
         with (
             batch_rows(batch.catalogue, tasks) as rows,
             event_lines(batch.events) as lines,
             live_table(verb, len(tasks)) as shown,
         ):
             reports = run_batch(verb, tasks, batch.crew(tasks), limits, [lines, shown, rows])
+    took_s = time.monotonic() - began
     for report in reports:
         for note in report["notes"]:
             warn(note)
@@ -66,6 +69,10 @@ def command(
         say_json("batch", {"verb": verb, **counts, "logs": reports})
     elif not batch.prints_events:
         print_reports(verb, reports, counts)
+        worked_on = [
+            task for task, report in zip(tasks, reports, strict=True) if report["outcome"] in {"done", "partial"}
+        ]
+        say_pace(recorded_hours(worked_on), took_s)
     say_errors(reports)
     if counts["failed"] == len(reports):
         raise typer.Exit(UNUSABLE)

@@ -4,9 +4,11 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import typer
 from typer.core import TyperCommand, TyperOption
 
 from mcap_landmarks.errors import UsageError
+from mcap_landmarks.locations import Location, Url, is_there
 from mcap_landmarks.moments import time_ns
 
 if TYPE_CHECKING:
@@ -15,6 +17,10 @@ if TYPE_CHECKING:
 _ONE_FILE = {"evaluate": ("--tum", "--thesis")}
 _OF_ONE_LOG = {"--from-reference", "--segments", "--parts", "--collect"}
 """Options that make no sense for many logs; a batch has workers for its logs already."""
+_INSTEAD = {
+    "--segments": "leave it out, as --workers logs are done at a time; or cut a long log with it without batch, first",
+}
+"""What to do without them, where that is something else than to do without a batch."""
 _OF_BATCH = {
     "--output": "-o of batch and `name` say where results go",
     "--json": "give --json to batch, on the command line",
@@ -41,9 +47,8 @@ def check_names(verb: str, own: TyperCommand, names: Collection[str], where: str
         if name not in known:
             raise UsageError(f"{where}{name} is no option of {verb}; see mcap-landmarks {verb} --help")
         if name in _OF_ONE_LOG:
-            raise UsageError(
-                f"{where}{name} is for one log, and batch {verb} has many; run {verb} without batch for it"
-            )
+            instead = _INSTEAD.get(name, f"run {verb} without batch for it")
+            raise UsageError(f"{where}{name} is for one log, and batch {verb} has many; {instead}")
         if name in _ONE_FILE.get(verb, ()):
             raise UsageError(
                 f"{where}{name} names one file, and batch {verb} has many logs; run {verb} without batch for it"
@@ -76,7 +81,8 @@ def check_logs(verb: str, own: TyperCommand, logs: "Sequence[FleetLog]") -> None
 def check_values(
     verb: str, own: TyperCommand, words: Sequence[str], log: "FleetLog | None" = None, passed: Sequence[str] = ()
 ) -> None:
-    """Parse the words of one log, and refuse times that are none, and files to read that are not there.
+    """Parse the words of one log, and refuse settings and times that are none, and files and networks to read that are
+    not there.
 
     Args:
         verb: what is done.
@@ -88,26 +94,80 @@ def check_values(
     Raises:
         UsageError: an option makes no sense.
     """
-    context = own.make_context(f"mcap-landmarks {verb}", list(words))
     given = {word.partition("=")[0] for word in passed}
     origins = {f"--{key}": where for key, where in (log.origins if log else {}).items() if f"--{key}" not in given}
+    found = _parsed(verb, own, words, origins)
     outputs = {"--output", *(("--map",) if verb == "map" else ())}
-    for option in _options(own):
-        if outputs.isdisjoint(option.opts):
-            found = context.params.get(option.name or "")
-            for value in found if isinstance(found, (list, tuple)) else [found]:
-                _check_value(option.opts[0], value, origins)
+    for name, values in found.items():
+        if name not in outputs:
+            for value in values:
+                _check_value(name, value, origins.get(name))
+    _check_settings(found, origins)
 
 
-def _check_value(name: str, value: object, origins: Mapping[str, str]) -> None:
-    where = origins.get(name)
+def _parsed(
+    verb: str, own: TyperCommand, words: Sequence[str], origins: Mapping[str, str]
+) -> dict[str, Sequence[object]]:
+    """The values of each option by its long name, as the verb's parser understands them."""
+    try:
+        context = own.make_context(f"mcap-landmarks {verb}", list(words))
+    except typer.BadParameter as error:
+        names = error.param.opts if error.param else ()
+        for name in names:
+            if name in origins:
+                raise UsageError(f"{origins[name]}: no value of {name}; see mcap-landmarks {verb} --help") from error
+        raise
+    values = {max(option.opts, key=len): context.params.get(option.name or "") for option in _options(own)}
+    return {name: [*value] if isinstance(value, (list, tuple)) else [value] for name, value in values.items()}
+
+
+def _check_value(name: str, value: object, where: str | None) -> None:
     if name in _TIMES and isinstance(value, str):
         time_ns(value, f"{where} =" if where else name)
-    is_network = name == "--model" and isinstance(value, Path) and value.parent == Path() and not value.suffix
-    if isinstance(value, Path) and not is_network and not value.exists():
+    if not isinstance(value, (Path, Url)):
+        return
+    if name == "--model" and _is_network(value):
+        _check_network(value, where)
+    elif not is_there(value):
         if where:
             raise UsageError(f"{where} = '{value}': there is no such file; name it from where the command runs")
         raise UsageError(f"{name} {value}: there is no such file; check the path")
+
+
+def _check_settings(found: Mapping[str, Sequence[object]], origins: Mapping[str, str]) -> None:
+    """Refuse settings that are none, and those that name a file or network that is not there."""
+    from mcap_landmarks.config import gather, named_files
+
+    (file,), texts = found.get("--config", [None]), [str(text) for text in found.get("--set", ()) if text is not None]
+    if not isinstance(file, (Path, Url)):
+        file = None
+    from_manifest = origins.get("--set", "") if texts else origins.get("--config", "")
+    try:
+        settings = gather(file, texts, None)
+    except UsageError as error:
+        raise UsageError(f"{from_manifest}: {error}" if from_manifest else str(error)) from error
+    for key, place in named_files(settings).items():
+        is_set = any(text.partition("=")[0].strip() == key for text in texts)
+        where = f"{origins.get('--set', '--set')}: {key}" if is_set else f"{file}: {key}"
+        if key == "detect.model" and _is_network(place):
+            _check_network(place, where)
+        elif not is_there(place):
+            raise UsageError(f"{where} = '{place}': there is no such file; name it from where the command runs")
+
+
+def _is_network(place: Location) -> bool:
+    """Whether a model is called by a name: one word without a dot."""
+    return isinstance(place, Path) and place.parent == Path() and not place.suffix
+
+
+def _check_network(name: Location, where: str | None) -> None:
+    """Refuse the name of a network that is not here, with where a manifest or file has it."""
+    from mcap_landmarks.networks.choice import choose_network
+
+    try:
+        choose_network(name, generated=False)
+    except UsageError as error:
+        raise UsageError(f"{where}: {error}" if where else str(error)) from error
 
 
 def _check_folder(log: "FleetLog") -> None:

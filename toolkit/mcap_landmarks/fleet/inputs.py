@@ -9,7 +9,7 @@ from mcap_landmarks.atomic import check_target
 from mcap_landmarks.errors import ToolkitError, UsageError
 from mcap_landmarks.fleet.fleet_manifest import ListedLog, read_fleet_manifest
 from mcap_landmarks.inspection.open_logs import open_logs
-from mcap_landmarks.locations import Location, Url, address, is_there, location, matching, same_place
+from mcap_landmarks.locations import Location, Url, address, is_folder, is_there, location, matching, same_place
 
 MANIFEST = ".toml"
 """What a manifest's name ends with."""
@@ -60,7 +60,8 @@ def _place(file: Location, listed: ListedLog) -> Location:
     """Where a log of a manifest is; paths in it are meant from its folder.
 
     Raises:
-        UsageError: the path is a pattern, or of this machine and nothing is there.
+        UsageError: the path is a pattern or a prefix of URLs, or of this machine and nothing is there.
+        RemoteError: a URL without suffix, which might be a prefix, cannot be asked for.
     """
     path = listed.entry.path
     place = location(path)
@@ -73,6 +74,8 @@ def _place(file: Location, listed: ListedLog) -> Location:
         raise UsageError(f"{listed.where}: path = '{place}': patterns are for the command line; list each log")
     if is_local:
         raise UsageError(f"{listed.where}: path = '{place}': there is no such file; name it from the manifest's folder")
+    if path.endswith("/") or (not place.suffix and is_folder(place)):
+        raise UsageError(f"{listed.where}: path = '{place}': prefixes are for the command line; list each log")
     return place
 
 

@@ -4,7 +4,7 @@ import contextlib
 import threading
 from collections.abc import Mapping
 
-from mcap_landmarks.errors import RemoteError, UsageError
+from mcap_landmarks.errors import UsageError
 from mcap_landmarks.remote.addresses import scheme_of, shown
 from mcap_landmarks.remote.refusals import WholeOnlyError, persistently
 from mcap_landmarks.remote.stored_file import stored_file
@@ -17,8 +17,8 @@ def urls_matching(text: str) -> list[str]:
     Sorted by name. A web server lists nothing: there only the file itself can be meant.
 
     Raises:
-        UsageError: a pattern that nothing fits, or one for a web server; or see `store`.
-        RemoteError: there is nothing, or it cannot be listed.
+        UsageError: there is nothing of that name, or a pattern for a web server; or see `store`.
+        RemoteError: it cannot be listed.
     """
     if is_web(text):
         if "*" in text.partition("?")[0]:
@@ -37,7 +37,7 @@ def urls_matching(text: str) -> list[str]:
     if not files and is_pattern:
         raise UsageError(f"{shown(text)}: no file matches; quote the pattern and check the folder")
     if not files:
-        raise RemoteError(f"{shown(text)}: there is no such file, and none below it; check the URL")
+        raise UsageError(f"{shown(text)}: there is no such file, and none below it; check the URL")
     return [beside(text, name) for name in files]
 
 

@@ -32,6 +32,10 @@ class FolderError(RemoteError):
     """A prefix of files, where a file is meant."""
 
 
+_BUCKETS = {**dict.fromkeys(("s3", "gs"), "bucket"), **dict.fromkeys(("az", "abfs", "abfss"), "container")}
+"""What the stores call the first part of a path, which names no file yet."""
+
+
 def stored_file(text: str, is_closed: threading.Event) -> StoredFile:
     """The file of a URL.
 
@@ -46,10 +50,12 @@ def stored_file(text: str, is_closed: threading.Event) -> StoredFile:
         from mcap_landmarks.remote.web_file import WebFile  # noqa: PLC0415 # a library that other stores do without
 
         return persistently(text, lambda: WebFile(file_system, text), is_closed)
-    if scheme_of(text) == "s3" and "/" not in path.strip("/"):
-        what = "names a bucket, not a file" if path.strip("/") else "names neither a bucket nor a file"
-        raise RemoteError(f"{shown(text)}: {what}; name a file, as s3://BUCKET/NAME")
-    kind = _PinnedFile if scheme_of(text) == "s3" else _CheckedFile
+    scheme = scheme_of(text)
+    if scheme in _BUCKETS and "/" not in path.strip("/"):
+        bucket = _BUCKETS[scheme]
+        what = f"names a {bucket}, not a file" if path.strip("/") else f"names neither a {bucket} nor a file"
+        raise RemoteError(f"{shown(text)}: {what}; name a file, as {scheme}://{bucket.upper()}/NAME")
+    kind = _PinnedFile if scheme == "s3" else _CheckedFile
 
     def open_it() -> StoredFile:
         try:
