@@ -134,6 +134,8 @@ def test_trouble_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert call("foxglove", tmp_path / "none.mcap", "-o", out) == UNUSABLE
     assert not out.exists()
     first = made(log, tmp_path)
+    assert call("foxglove", log, "-o", out) == DONE  # nothing is lost where it is the same
+    out.write_text("mine")
     assert "exists" in refused(capsys, 2, "foxglove", log, "-o", out)
     assert call("foxglove", log, "-o", out, "--overwrite") == DONE
     assert json.loads(out.read_text()) == first

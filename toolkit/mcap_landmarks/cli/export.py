@@ -56,13 +56,12 @@ def command(
 
     chosen = form.lower()
     _check(chosen, topic, child, images)
-    with new_files([output], [result], overwrite=overwrite):
-        if chosen == _RERUN:
-            done = _rerun(result, output)
-        elif chosen == _COCO:
-            done = _coco(result, output, topic, images, overwrite=overwrite)
-        else:
-            done = _trajectory(result, output, chosen, topic, child)
+    if chosen in {_RERUN, _COCO}:
+        with new_files([output], [result], overwrite=overwrite):
+            is_rerun = chosen == _RERUN
+            done = _rerun(result, output) if is_rerun else _coco(result, output, topic, images, overwrite=overwrite)
+    else:
+        done = _trajectory(result, output, chosen, topic, child, overwrite=overwrite)
     if json:
         say_json("export", {"output": str(output), "format": chosen, **done.told, "losses": list(done.losses)})
     for note in done.notes:
@@ -95,16 +94,20 @@ def _check(form: str, topic: str | None, child: str | None, images: Location | N
             raise UsageError(f"{option} is not for --format {form}; leave it out, or use {', '.join(heeding)}")
 
 
-def _trajectory(result: Location, output: Location, form: str, topic: str | None, child: str | None) -> _Exported:
+def _trajectory(
+    result: Location, output: Location, form: str, topic: str | None, child: str | None, *, overwrite: bool
+) -> _Exported:
     from mcap_landmarks.atomic import atomic_file
     from mcap_landmarks.evaluation.export import TrajectoryFormat, render
     from mcap_landmarks.evaluation.pose_topics import read_poses
+    from mcap_landmarks.runs.replacing import consists_of, output_to
 
     with progress(f"read {result.name}", size_of(result) or None) as advance:
         track = read_poses(result, topic, child, advance)
     text, notes = render(track, TrajectoryFormat(form))
-    with atomic_file(output) as stream:
-        stream.write(text.encode())
+    content = text.encode()
+    with output_to(output, [result], consists_of(content), overwrite=overwrite), atomic_file(output) as stream:
+        stream.write(content)
     if topic is None and track.others:
         others = ", ".join(track.others)
         notes = [*notes, f"{track.topic} is taken; --topic chooses another: {others}"]

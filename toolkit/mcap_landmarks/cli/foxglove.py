@@ -22,13 +22,13 @@ def command(
     """Write a layout that Foxglove and Lichtblick import as it is; it names nothing that RESULT does not have."""
     from mcap_landmarks.atomic import atomic_file
     from mcap_landmarks.report.layout_file import read_layout
-    from mcap_landmarks.runs.replacing import new_files
+    from mcap_landmarks.runs.replacing import consists_of, output_to
 
-    with new_files([output], [result], overwrite=overwrite):
-        with progress(f"read {result.name}", size_of(result) or None) as advance:
-            made = read_layout(result, advance)
-        with atomic_file(output) as stream:
-            stream.write((json_text.dumps(made.document, indent=2) + "\n").encode())
+    with progress(f"read {result.name}", size_of(result) or None) as advance:
+        made = read_layout(result, advance)
+    content = (json_text.dumps(made.document, indent=2) + "\n").encode()
+    with output_to(output, [result], consists_of(content), overwrite=overwrite), atomic_file(output) as stream:
+        stream.write(content)
     if json:
         left_out = [{"topic": topic, "reason": reason} for topic, reason in made.left_out.items()]
         told = {"output": str(output), "panels": list(made.panels), "topics": list(made.topics), "left_out": left_out}

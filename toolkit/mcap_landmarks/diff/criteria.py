@@ -5,7 +5,7 @@ import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal, TypeVar, get_args
 
 from pydantic import Field, TypeAdapter, ValidationError
 
@@ -136,6 +136,8 @@ def _by_metric(path: Location, table: Mapping[str, object], prefix: str = "") ->
             found[name] = value
         elif isinstance(value, dict) and any(metric.startswith(f"{name}.") for metric in METRICS):
             found.update(_by_metric(path, value, f"{name}."))
+        elif name in METRICS:
+            raise UsageError(f"{path}: metrics.{name} = {_written(value)}: give a table, such as {{ margin = 0.05 }}")
         else:
             raise UsageError(f"{path}: there is no figure {name} with criteria{nearest(name, METRICS)}")
     return found
@@ -160,7 +162,23 @@ def _validated(path: Location, adapter: TypeAdapter[_T], values: Mapping[str, ob
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        raise UsageError(f"{path}: {prefix}{key} = {first['input']!r}: {first['msg']}") from error
+        raise UsageError(f"{path}: {prefix}{key} = {_written(first['input'])}: {_EXPECTED[key]}") from error
+
+
+_EXPECTED = {
+    "confidence": "give a number from 0.5 to below 1, such as 0.95",
+    **dict.fromkeys(("inconclusive", "missing"), 'give "pass" or "fail"'),
+    **dict.fromkeys(("margin", "log_margin"), "give a number above 0, such as 0.05"),
+    "direction": f"give one of {', '.join(get_args(Direction))}",
+    "gates": "give true or false",
+    "limit": "give a number",
+}
+"""What each key takes, and so what to do where it has something else."""
+
+
+def _written(value: object) -> str:
+    """A value as TOML has it, as far as that differs."""
+    return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def _plain(value: object) -> object:

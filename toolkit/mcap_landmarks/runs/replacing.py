@@ -148,6 +148,16 @@ def earlier_picture(verb: str, inputs: Sequence[Location]) -> IsEarlier:
     return lambda path: _holds(path, picture_mark(verb, inputs))
 
 
+def consists_of(content: bytes) -> IsEarlier:
+    """Files with this very content, for what has no place to tell what it was made of: nothing is lost with them."""
+
+    def is_earlier(place: Location) -> bool:
+        with place.open("rb") as stream:
+            return stream.read(len(content) + 1) == content
+
+    return is_earlier
+
+
 def carries(text: str) -> IsEarlier:
     """Files with a text among their bytes."""
     return lambda path: _holds(path, text)
