@@ -1,18 +1,22 @@
 """Run a verb over many logs, with workers that outlast what becomes of a log."""
 
 import time
-from typing import Annotated
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.batch_map import map_logs
 from mcap_landmarks.cli.batch_options import BatchOptions
-from mcap_landmarks.cli.batch_reports import counts_of, print_reports, say_errors, say_pace
+from mcap_landmarks.cli.batch_reports import Report, counts_of, print_reports, say_errors, say_pace
 from mcap_landmarks.cli.batch_tasks import VERBS, tasks_of
 from mcap_landmarks.cli.console import PARTIAL, UNUSABLE, say_json, warn
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
+
+if TYPE_CHECKING:
+    from mcap_landmarks.fleet.tasks import Task
 
 context_settings = {"allow_extra_args": True, "ignore_unknown_options": True}
 
@@ -42,7 +46,6 @@ def command(
     from mcap_landmarks.cli.batch_events import event_lines
     from mcap_landmarks.cli.batch_run import run_batch
     from mcap_landmarks.cli.batch_table import live_table
-    from mcap_landmarks.fleet.recorded_hours import recorded_hours
     from mcap_landmarks.runs.outputs import no_empty_folder
 
     if batch.prints_events and json:
@@ -68,13 +71,17 @@ def command(
     if json:
         say_json("batch", {"verb": verb, **counts, "logs": reports})
     elif not batch.prints_events:
-        print_reports(verb, reports, counts)
-        worked_on = [
-            task for task, report in zip(tasks, reports, strict=True) if report["outcome"] in {"done", "partial"}
-        ]
-        say_pace(recorded_hours(worked_on), took_s)
+        _print(verb, tasks, reports, took_s)
     say_errors(reports)
     if counts["failed"] == len(reports):
         raise typer.Exit(UNUSABLE)
     if counts["failed"] or counts["partial"] or rows.is_lost:
         raise typer.Exit(PARTIAL)
+
+
+def _print(verb: str, tasks: "Sequence[Task]", reports: Sequence[Report], took_s: float) -> None:
+    from mcap_landmarks.fleet.recorded_hours import recorded_hours
+
+    print_reports(verb, reports, counts_of(reports))
+    pairs = zip(tasks, reports, strict=True)
+    say_pace(recorded_hours(task for task, report in pairs if report["outcome"] in {"done", "partial"}), took_s)

@@ -12,6 +12,7 @@ from mcap_landmarks.locations import Location, Url, is_there
 from mcap_landmarks.moments import time_ns
 
 if TYPE_CHECKING:
+    from mcap_landmarks.config import Settings
     from mcap_landmarks.fleet.inputs import FleetLog
 
 _ONE_FILE = {"evaluate": ("--tum", "--thesis")}
@@ -136,23 +137,28 @@ def _check_value(name: str, value: object, where: str | None) -> None:
 
 def _check_settings(found: Mapping[str, Sequence[object]], origins: Mapping[str, str]) -> None:
     """Refuse settings that are none, and those that name a file or network that is not there."""
-    from mcap_landmarks.config import gather, named_files
+    from mcap_landmarks.config import named_files
 
     (file,), texts = found.get("--config", [None]), [str(text) for text in found.get("--set", ()) if text is not None]
-    if not isinstance(file, (Path, Url)):
-        file = None
-    from_manifest = origins.get("--set", "") if texts else origins.get("--config", "")
-    try:
-        settings = gather(file, texts, None)
-    except UsageError as error:
-        raise UsageError(f"{from_manifest}: {error}" if from_manifest else str(error)) from error
-    for key, place in named_files(settings).items():
+    config = file if isinstance(file, (Path, Url)) else None
+    from_manifest = origins.get("--set" if texts else "--config", "")
+    for key, place in named_files(_gathered(config, texts, from_manifest)).items():
         is_set = any(text.partition("=")[0].strip() == key for text in texts)
         where = f"{origins.get('--set', '--set')}: {key}" if is_set else f"{file}: {key}"
         if key == "detect.model" and _is_network(place):
             _check_network(place, where)
         elif not is_there(place):
             raise UsageError(f"{where} = '{place}': there is no such file; name it from where the command runs")
+
+
+def _gathered(file: Location | None, texts: Sequence[str], where: str) -> "Settings":
+    """The settings of a file and of texts; what a manifest has of them is refused by its name."""
+    from mcap_landmarks.config import gather
+
+    try:
+        return gather(file, texts, None)
+    except UsageError as error:
+        raise UsageError(f"{where}: {error}" if where else str(error)) from error
 
 
 def _is_network(place: Location) -> bool:
