@@ -37,13 +37,19 @@ class PlacedObject:
         """x, y, heading (3,) at a time after the start."""
         if not self.moves:
             return np.array([*self.route_xy[0], self.yaw_rad])
-        ahead = np.roll(self.route_xy, -1, axis=0) - self.route_xy
-        lengths = np.hypot(ahead[:, 0], ahead[:, 1])
-        ends = np.cumsum(lengths)
+        ahead, lengths, ends = _legs(self)
         walked = time_s * self.speed_mps % ends[-1]
         leg = int(np.searchsorted(ends, walked, side="right"))
         share = (walked - ends[leg] + lengths[leg]) / lengths[leg]
         return np.array([*(self.route_xy[leg] + share * ahead[leg]), np.arctan2(ahead[leg, 1], ahead[leg, 0])])
+
+
+@functools.lru_cache(maxsize=1024)
+def _legs(placed: PlacedObject) -> tuple[Floats, Floats, Floats]:
+    """The way (K, 2) from each point of a route to the next, its length (K,), and how far along the route it ends."""
+    ahead = np.roll(placed.route_xy, -1, axis=0) - placed.route_xy
+    lengths = np.hypot(ahead[:, 0], ahead[:, 1])
+    return ahead, lengths, np.cumsum(lengths)
 
 
 def place(specs: tuple[ObjectSpec, ...]) -> tuple[PlacedObject, ...]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Self
 
 import numpy as np
@@ -125,7 +126,8 @@ class World:
                 collisionFilterMask=STATIC_GROUP,
                 physicsClientId=self._client,
             )
-        share = np.array([hit[2] for hit in hits])
-        normals = np.array([hit[4] for hit in hits]).reshape(-1, 3)
+        bodies, _, shares, _, normals = zip(*hits, strict=True)
+        share = np.array(shares)
+        normal = np.fromiter(chain.from_iterable(normals), np.float64, 3 * len(hits)).reshape(-1, 3)
         distances = np.where(share < 1.0, share * reach_m, np.inf)
-        return distances, np.abs((normals * directions).sum(axis=1)), np.array([hit[0] for hit in hits], dtype=np.int64)
+        return distances, np.abs((normal * directions).sum(axis=1)), np.array(bodies, dtype=np.int64)

@@ -1,8 +1,10 @@
 """How fast the generator records, where the time goes, and that its memory does not grow with the log.
 
-python -m tests.benchmark.generator [--json] [--quick]
+python -m tests.benchmark.generator [--json] [--quick] [--against FOLDER]
 """
 
+import argparse
+import json
 import os
 import subprocess
 import sys
@@ -30,6 +32,9 @@ from tests.benchmark.rows import Row, main
 
 WORKERS = 2
 QUICK_STOPS = 5
+# Recorded by this checkout and another one in turn: so many stops, and how many times as fast this one is to be.
+AGAINST = {"loop": (3, 1.5), "cluttered": (3, 2.0)}
+ROUNDS = 3
 PROFILED_IMAGES = 150
 # A lap around three objects, driven once and ten times as often.
 LAP = """\
@@ -47,13 +52,55 @@ waypoints = [ { at = [1.0, 0.0] }, { at = [0.0, 1.0] }, { at = [-1.0, 0.0] }, { 
 """
 
 
-def measure(quick: bool) -> Iterator[Row]:
-    """All rows."""
+def measure(quick: bool, against: Path | None = None) -> Iterator[Row]:
+    """All rows; of a comparison only its own."""
     with tempfile.TemporaryDirectory() as folder:
+        if against is not None:
+            yield from compared(Path(folder), against, 1 if quick else ROUNDS)
+            return
         yield from speed_of(Path(folder), quick)
         yield from memory(Path(folder), quick)
-    yield from parts_of_an_image("loop")
-    yield from parts_of_an_image("cluttered")
+    for name in ("loop", "cluttered", "street"):
+        yield from parts_of_an_image(name)
+
+
+def compared(folder: Path, against: Path, rounds: int) -> Iterator[Row]:
+    """Processor time of recording in one process, here and in another checkout, in turn: the least of each."""
+    here = Path(__file__).parents[2]
+    for name, (stops, goal) in AGAINST.items():
+        times: dict[Path, list[float]] = {against: [], here: []}
+        images = 0
+        for _ in range(rounds):
+            for checkout, spent in times.items():
+                told = _recorded(checkout, name, stops, folder)
+                spent.append(told["processor_s"])
+                images = int(told["images"])
+        best = {checkout: min(spent) for checkout, spent in times.items()}
+        yield Row(
+            f"{name}: times as fast as the other checkout",
+            best[against] / best[here],
+            "x",
+            at_least=goal,
+            cases=images,
+            peers={"s": best[here], "s there": best[against]},
+        )
+
+
+def _recorded(checkout: Path, name: str, stops: int, folder: Path) -> dict[str, float]:
+    """What `short_recording` tells, run with the packages of a checkout."""
+    script = Path(__file__).with_name("short_recording.py")
+    paths = os.pathsep.join(str(checkout.resolve() / part) for part in ("toolkit", "generator"))
+    output = folder / "short.mcap"
+    output.unlink(missing_ok=True)
+    run = subprocess.run(
+        [sys.executable, "-P", str(script), name, str(stops), str(output)],
+        env={**os.environ, "PYTHONPATH": paths},
+        check=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+    told: dict[str, float] = json.loads(run.stdout)
+    return told
 
 
 def speed_of(folder: Path, quick: bool) -> Iterator[Row]:
@@ -76,6 +123,13 @@ def speed_of(folder: Path, quick: bool) -> Iterator[Row]:
     )
     yield Row(f"{label}: images", images / took_s, "1/s", cases=images)
     yield Row("loop: simulation alone over real time", _simulation_alone(staged), "x real time")
+    street = stage(load_scenario("street"))
+    start = time.perf_counter()
+    summary = record(street, folder / "street.mcap", WORKERS)
+    real_time = summary.simulated_s / (time.perf_counter() - start)
+    label = f"street, 16 rings and images at 10 Hz, {WORKERS} workers"
+    yield Row(f"{label}: simulated over real time", real_time, "x real time", at_least=0.9)
+    yield Row("street: simulation alone over real time", _simulation_alone(street), "x real time")
 
 
 def _simulation_alone(staged: Staged) -> float:
@@ -117,8 +171,7 @@ def parts_of_an_image(name: str) -> Iterator[Row]:
     parts: list[tuple[str, Any, str]] = [
         ("ground, shadows and sky", Backdrop, "view"),
         ("objects drawn", Drawing, "render"),
-        ("objects put in place", Drawing, "show"),
-        ("of these, what is hidden", Renderer, "silhouette_px"),
+        ("what is hidden", Drawing, "mask"),
         ("blur and noise", Optics, "expose"),
         ("JPEG", Optics, "jpeg"),
     ]
@@ -173,5 +226,11 @@ def _drawn(staged: Staged, jobs: list[ImageJob]) -> tuple[float, float]:
     return float(np.mean(objects)), float(np.mean(triangles))
 
 
+def _options() -> argparse.ArgumentParser:
+    options = argparse.ArgumentParser(add_help=False)
+    options.add_argument("--against", type=Path, metavar="FOLDER", help="only compare with another checkout")
+    return options
+
+
 if __name__ == "__main__":
-    sys.exit(main(measure, __doc__ or ""))
+    sys.exit(main(measure, __doc__ or "", _options()))
