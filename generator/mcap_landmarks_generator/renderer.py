@@ -72,7 +72,8 @@ class Renderer:
         self._objects = objects
         self._centres = np.array([placed.route_xy[0] for placed in objects]).reshape(-1, 2)
         self._moving = np.array([placed.moves for placed in objects], dtype=bool)
-        self._reach_m = np.array([placed.asset.footprint_radius_m for placed in objects])
+        self._reach_of = {placed.object_id: placed.asset.footprint_radius_m for placed in objects}
+        self._reach_m = np.array(list(self._reach_of.values()))
         self._corners = [_corners(placed, 0.0) for placed in objects]
         self._backdrop = Backdrop(
             Pinhole.of(*self.size_px, self._intrinsics.focal_px),
@@ -105,7 +106,7 @@ class Renderer:
         )
         bodies = bodies_of(objects)
         visible = tuple(
-            _visible(view, placed, body, window) for (placed, window), body in zip(in_view, bodies, strict=True)
+            self._visible(view, placed, body, window) for (placed, window), body in zip(in_view, bodies, strict=True)
         )
         window = self._inner_window([one.window for one in visible])
         if window is None:
@@ -123,6 +124,11 @@ class Renderer:
         area_px = one.window.width * one.window.height
         scale = SUPERSAMPLING * min(1.0, float(np.sqrt(_SILHOUETTE_AREA_PX / area_px)))
         return self._drawing.mask(view, one.placed, one.window, scale)
+
+    def _visible(self, view: Viewpoint, placed: PlacedObject, bodies: tuple[Body, ...], window: Window) -> Visible:
+        distance = float(np.hypot(*(placed.pose_at(view.time_s)[:2] - view.eye_m[:2])))
+        reach = self._reach_of[placed.object_id]
+        return Visible(placed, bodies, window, distance - reach, distance + reach)
 
     def _in_view(self, view: Viewpoint) -> list[tuple[PlacedObject, Window]]:
         """Objects within reach whose bounding box meets the image, with the window that holds the box."""
@@ -184,12 +190,6 @@ class Renderer:
                     self._shadows[placed.object_id] = shadow
             shadows.append(shadow)
         return shadows
-
-
-def _visible(view: Viewpoint, placed: PlacedObject, bodies: tuple[Body, ...], window: Window) -> Visible:
-    distance = float(np.hypot(*(placed.pose_at(view.time_s)[:2] - view.eye_m[:2])))
-    reach = placed.asset.footprint_radius_m
-    return Visible(placed, bodies, window, distance - reach, distance + reach)
 
 
 def _corners(placed: PlacedObject, time_s: float) -> Floats:
