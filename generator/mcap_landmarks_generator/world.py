@@ -44,7 +44,7 @@ class World:
     def __init__(self, objects: Sequence[PlacedObject], start: Floats) -> None:
         """Put the robot at x, y, heading `start` (3,)."""
         self._client: int = pybullet.connect(pybullet.DIRECT)
-        self._store = AssetStore(self._client)
+        self._store = AssetStore(self._client, seen=False)
         pybullet.setGravity(0.0, 0.0, -9.81, physicsClientId=self._client)
         pybullet.setTimeStep(STEP_NS / 1e9, physicsClientId=self._client)
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
@@ -109,9 +109,11 @@ class World:
             distances[through], cosines[through], bodies[through] = begun + found[0], found[1], found[2]
             passed[through] += 1
         names = ("", *sorted({placed.asset.name for placed in self._object_of_body.values()}))
-        number = {body: names.index(placed.asset.name) for body, placed in self._object_of_body.items()}
-        name_of = np.array([number.get(body, 0) for body in bodies.tolist()], dtype=np.int64)
-        return Returns(distances, cosines, names, name_of, passed)
+        # Nothing is hit as body -1, which is the last one of the table.
+        number = np.zeros(max(self._object_of_body, default=0) + 2, np.int64)
+        for body, placed in self._object_of_body.items():
+            number[body] = names.index(placed.asset.name)
+        return Returns(distances, cosines, names, number[bodies], passed)
 
     def _hits(self, starts: Floats, directions: Floats, reach_m: Floats) -> tuple[Floats, Floats, NDArray[np.int64]]:
         """Distances (N,), cosines of the angles to the normals (N,) and bodies (N,) that rays meet in reach (N,)."""

@@ -45,8 +45,9 @@ class AssetStore:
     Collision meshes are concave and identical to the visual ones, so that a ray hits what the image shows.
     """
 
-    def __init__(self, client: int) -> None:
-        self._client = client
+    def __init__(self, client: int, seen: bool = True) -> None:
+        """Bodies that are not to be `seen` in PyBullet's own images go without textures and visual meshes."""
+        self._client, self._seen = client, seen
         self._folder = tempfile.TemporaryDirectory(prefix="generator-textures-")
         self._shapes: dict[tuple[str, str, int], tuple[_Shapes, ...]] = {}
         self._texture_count = 0
@@ -71,7 +72,7 @@ class AssetStore:
             body = pybullet.createMultiBody(
                 0, shapes.collision, shapes.visual, place, turn, physicsClientId=self._client
             )
-            if not shapes.clear:
+            if shapes.visual != _NOTHING:
                 pybullet.changeVisualShape(body, -1, textureUniqueId=shapes.texture, physicsClientId=self._client)
             bodies.append(Body(body, shapes.labelled, shapes.clear))
         return tuple(bodies)
@@ -104,7 +105,7 @@ class AssetStore:
         textures: dict[int, int] = {}
         shapes = []
         for part in asset.parts:
-            if id(part.texture) not in textures:
+            if self._seen and id(part.texture) not in textures:
                 textures[id(part.texture)] = self._texture(part.texture)
             collision = pybullet.createCollisionShape(
                 pybullet.GEOM_MESH,
@@ -113,6 +114,7 @@ class AssetStore:
                 flags=pybullet.GEOM_FORCE_CONCAVE_TRIMESH,
                 physicsClientId=self._client,
             )
-            visual = _NOTHING if part.clear else self._visual(part)
-            shapes.append(_Shapes(visual, collision, textures[id(part.texture)], part.labelled, part.clear))
+            visual = self._visual(part) if self._seen and not part.clear else _NOTHING
+            texture = textures.get(id(part.texture), _NOTHING)
+            shapes.append(_Shapes(visual, collision, texture, part.labelled, part.clear))
         return tuple(shapes)
