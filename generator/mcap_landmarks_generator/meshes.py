@@ -109,7 +109,8 @@ class MeshStore:
             column = np.clip(part.uv[:, 0] * width, 0, width - 0.01)
             row = np.clip((1 - part.uv[:, 1]) * height, 0, height - 0.01)
             texture.append(np.column_stack([column, places[id(part.texture)] + row]).astype(np.float32))
-            faces.append(part.faces.astype(np.int32) + count)
+            # Panes of glass are not seen.
+            faces.append(part.faces[: 0 if part.clear else None].astype(np.int32) + count)
             count += len(part.vertices)
         sizes = [len(part.vertices) for part in asset.parts]
         return _Model(
