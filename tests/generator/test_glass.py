@@ -61,5 +61,6 @@ def test_cameras_see_the_frame_only(stage_text: StageText) -> None:
     with Renderer(staged.scenario, staged.objects) as both, Renderer(staged.scenario, staged.objects[1:]) as without:
         seen, bare = both.draw(view).image, without.draw(view).image
     inside = np.abs(seen[60:100, 40:280].astype(int) - bare[60:100, 40:280])
-    assert inside.max() == 0
+    # Another window is drawn, and its rounding differs.
+    assert inside.max() <= 1
     assert np.abs(seen.astype(int) - bare).max() > 30
