@@ -71,7 +71,8 @@ def views(class_name: str, variant: str, seed: int, distances_m: Sequence[float]
     objects = place((ObjectSpec(class_name=class_name, at=(0.0, 0.0), variant=variant, look=seed),))
     scenario = Scenario(seed=seed)
     optics = Optics(scenario.camera, Intrinsics.of(scenario.camera).focal_px, seed)
-    with Renderer(scenario, objects) as renderer, World(objects, np.array([_ASIDE_M, 0.0, 0.0])) as world:
+    renderer = Renderer(scenario, objects)
+    with World(objects, np.array([_ASIDE_M, 0.0, 0.0])) as world:
         for index, (distance_m, yaw_deg) in enumerate((d, yaw) for d in distances_m for yaw in YAWS_DEG):
             base = _opposite(distance_m, np.deg2rad(yaw_deg))
             view = _viewpoint(base)

@@ -50,6 +50,14 @@ class Viewpoint:
     world_from_optical: Floats
     time_s: float
 
+    @classmethod
+    def towards(cls, eye_m: Floats, target_m: Floats, upwards: Floats) -> "Viewpoint":
+        """From an eye (3,) to a target (3,) at the start, with what lies `upwards` (3,) above it in the image."""
+        forwards = (target_m - eye_m) / np.linalg.norm(target_m - eye_m)
+        right = np.cross(forwards, upwards)
+        right /= np.linalg.norm(right)
+        return cls(eye_m, np.column_stack([right, np.cross(forwards, right), forwards]), 0.0)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageJob:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Self
 
 import cv2
 import numpy as np
@@ -34,7 +33,7 @@ def has_plain_lens(spec: CameraSpec) -> bool:
 
 
 class LensRenderer:
-    """Draws one scenario's world through its camera's lens; a context manager like `Renderer`.
+    """Draws one scenario's world through its camera's lens.
 
     Colours are interpolated in a pinhole image that is wide enough, with the focal length of the lens in its middle;
     masks take the nearest of its finer pixels, so that boxes are those of the bent image to half a pixel.
@@ -57,13 +56,6 @@ class LensRenderer:
         self._renderer = Renderer(replace(scenario, camera=wide), objects)
         self._maps = None if self._rows_differ else (self._map(self._grid), self._map(self._fine_grid))
         self._wide: dict[str, Visible] = {}
-
-    def __enter__(self) -> Self:
-        self._renderer.__enter__()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._renderer.__exit__()
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -157,7 +149,7 @@ def _extent(grid: Floats, turn_rad: float) -> Floats:
 
 
 def _number(numbers: dict[tuple[str, int], int], object_id: str, part: int) -> int:
-    """The number of a part of an object in the masks of one image: PyBullet's ids may differ from band to band."""
+    """The number of a part of an object in the masks of one image: ids differ from band to band."""
     return numbers.setdefault((object_id, part), len(numbers))
 
 

@@ -59,10 +59,9 @@ def top_view(staged: Staged, width_px: int, side_m: float) -> Image:
 
 def birds_eye(staged: Staged, size_px: tuple[int, int]) -> Image:
     """The world from a height, seen from the south (thesis, Figure 4.1)."""
-    view = _looking(np.array([0.0, -102.0, 48.0]), np.array([0.0, -8.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    view = Viewpoint.towards(np.array([0.0, -102.0, 48.0]), np.array([0.0, -8.0, 0.0]), np.array([0.0, 0.0, 1.0]))
     camera = replace(staged.scenario.camera, width_px=size_px[0], height_px=size_px[1], field_of_view_deg=54.0)
-    with Renderer(replace(staged.scenario, camera=camera), staged.objects, 250.0, 250.0) as renderer:
-        return renderer.draw(view).image
+    return Renderer(replace(staged.scenario, camera=camera), staged.objects, 250.0, 250.0).draw(view).image
 
 
 def lidar_field(staged: Staged, width_px: int, side_m: float) -> Image:
@@ -126,28 +125,27 @@ def returns_from_above(staged: Staged, after_s: float = 8.0, size_px: tuple[int,
 def first_good_image(staged: Staged) -> Image:
     """The first image of a recording, some way into it, that shows at least three objects well."""
     optics = Optics(staged.scenario.camera, Intrinsics.of(staged.scenario.camera).focal_px, staged.scenario.seed)
-    with Renderer(staged.scenario, staged.objects) as renderer:
-        for event in Simulation(staged).run():
-            if not isinstance(event, ImageJob) or event.index % 5:
-                continue
-            rendered = renderer.draw(event.view)
-            large = [one for one in rendered.visible if one.window.height > 40 and one.window.left > 0]
-            if len(large) >= 3:
-                return optics.expose(rendered.image, event.index, event.turn_radps)
+    renderer = Renderer(staged.scenario, staged.objects)
+    for event in Simulation(staged).run():
+        if not isinstance(event, ImageJob) or event.index % 5:
+            continue
+        rendered = renderer.draw(event.view)
+        large = [one for one in rendered.visible if one.window.height > 40 and one.window.left > 0]
+        if len(large) >= 3:
+            return optics.expose(rendered.image, event.index, event.turn_radps)
     return rendered.image
 
 
 def _from_above(staged: Staged, eye: Floats, width_px: int, side_m: float) -> tuple[Viewpoint, Image]:
     """A square of ground around a point, seen from above."""
-    view = _looking(eye, np.array([eye[0], eye[1], 0.0]), np.array([0.0, 1.0, 0.0]))
+    view = Viewpoint.towards(eye, np.array([eye[0], eye[1], 0.0]), np.array([0.0, 1.0, 0.0]))
     camera = replace(
         staged.scenario.camera,
         width_px=width_px,
         height_px=width_px,
         field_of_view_deg=float(np.rad2deg(2 * np.arctan(side_m / 2 / eye[2]))),
     )
-    with Renderer(replace(staged.scenario, camera=camera), staged.objects, 250.0, 250.0) as renderer:
-        return view, renderer.draw(view).image
+    return view, Renderer(replace(staged.scenario, camera=camera), staged.objects, 250.0, 250.0).draw(view).image
 
 
 def _projection(view: Viewpoint, width_px: int, side_m: float) -> Callable[[Floats], Floats]:
@@ -159,13 +157,6 @@ def _projection(view: Viewpoint, width_px: int, side_m: float) -> Callable[[Floa
         return camera.project((points - view.eye_m) @ view.world_from_optical)
 
     return pixel_from
-
-
-def _looking(eye: Floats, target: Floats, upwards: Floats) -> Viewpoint:
-    forwards = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(forwards, upwards)
-    right /= np.linalg.norm(right)
-    return Viewpoint(eye, np.column_stack([right, np.cross(forwards, right), forwards]), 0.0)
 
 
 def _line(image: Image, pixels: Floats, colour: Sequence[int]) -> None:

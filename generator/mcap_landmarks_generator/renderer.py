@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import cv2
 import numpy as np
@@ -46,7 +45,7 @@ class Visible:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rendered:
-    """An image (H, W, 3) RGB, and the ids of PyBullet's bodies (h, w), -1 for none, in a finer `window` of it."""
+    """An image (H, W, 3) RGB, and the ids of bodies (h, w), -1 for none, in a finer `window` of it."""
 
     image: Image
     body_ids: NDArray[np.int32]
@@ -55,7 +54,7 @@ class Rendered:
 
 
 class Renderer:
-    """Draws one scenario's world from any place; a context manager."""
+    """Draws one scenario's world from any place."""
 
     def __init__(
         self,
@@ -82,12 +81,6 @@ class Renderer:
             scenario.ground.tile_m,
         )
         self._shadows: dict[str, Shadow] = {}
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        return None
 
     @property
     def size_px(self) -> tuple[int, int]:

@@ -1,9 +1,9 @@
 """Renders images in this process or in several workers: the pictures are the same."""
 
+import contextlib
 import signal
 from collections import deque
 from collections.abc import Callable
-from contextlib import ExitStack
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
@@ -34,12 +34,7 @@ class Photographer:
 
     def __init__(self, staged: Staged) -> None:
         cv2.setNumThreads(1)
-        self._stack = ExitStack()
-        self._cameras = [_Studio(staged, mount, self._stack) for mount in mounts(staged.scenario)]
-
-    def close(self) -> None:
-        """Disconnect from PyBullet."""
-        self._stack.close()
+        self._cameras = [_Studio(staged, mount) for mount in mounts(staged.scenario)]
 
     def take(self, job: ImageJob) -> Messages:
         """The messages of one image."""
@@ -47,18 +42,18 @@ class Photographer:
 
 
 class _Studio:
-    """Takes the images of one camera; `stack` ends its renderer."""
+    """Takes the images of one camera."""
 
-    def __init__(self, staged: Staged, mount: Mount, stack: ExitStack) -> None:
+    def __init__(self, staged: Staged, mount: Mount) -> None:
         self._mount, self._lens = mount, Lens.of(mount.spec)
         self._optics = Optics(mount.spec, self._lens.focal_px, mount.seed)
         scenario = mount.scenario(staged.scenario)
         if has_plain_lens(mount.spec):
-            renderer = stack.enter_context(Renderer(scenario, staged.objects))
+            renderer = Renderer(scenario, staged.objects)
             self._drawn_by: Drawn = renderer
             self._draw: Callable[[ImageJob], Rendered] = lambda job: renderer.draw(job.view)
         else:
-            bending = stack.enter_context(LensRenderer(scenario, staged.objects))
+            bending = LensRenderer(scenario, staged.objects)
             self._drawn_by = bending
             self._draw = lambda job: bending.draw(job.view, job.readout)
 
@@ -100,8 +95,6 @@ class Darkroom:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._photographer is not None:
-            self._photographer.close()
         for process, pipe in self._workers:
             pipe.close()
             process.terminate()
@@ -157,8 +150,6 @@ def _work(staged: Staged, pipe: "Connection") -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGHUP, signal.SIG_IGN)
     photographer = Photographer(staged)
-    try:
+    with contextlib.suppress(EOFError, OSError):
         while True:
             pipe.send(photographer.take(pipe.recv()))
-    except (EOFError, OSError):
-        photographer.close()

@@ -44,7 +44,7 @@ class World:
     def __init__(self, objects: Sequence[PlacedObject], start: Floats) -> None:
         """Put the robot at x, y, heading `start` (3,)."""
         self._client: int = pybullet.connect(pybullet.DIRECT)
-        self._store = AssetStore(self._client, seen=False)
+        store = AssetStore(self._client)
         pybullet.setGravity(0.0, 0.0, -9.81, physicsClientId=self._client)
         pybullet.setTimeStep(STEP_NS / 1e9, physicsClientId=self._client)
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=self._client)
@@ -55,7 +55,7 @@ class World:
         self._walkers: list[tuple[PlacedObject, list[int]]] = []
         for placed in objects:
             x, y, heading = placed.pose_at(0.0)
-            spawned = self._store.spawn(placed.asset, (x, y, 0.0), heading)
+            spawned = store.spawn(placed.asset, (x, y, 0.0), heading)
             bodies = [body.body_id for body in spawned]
             self._panes += [body.body_id for body in spawned if body.clear]
             self._object_of_body.update(dict.fromkeys(bodies, placed))
@@ -68,7 +68,6 @@ class World:
 
     def __exit__(self, *_: object) -> None:
         pybullet.disconnect(physicsClientId=self._client)
-        self._store.__exit__(None, None, None)
 
     @property
     def has_walkers(self) -> bool:

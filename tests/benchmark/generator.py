@@ -186,7 +186,6 @@ def parts_of_an_image(name: str) -> Iterator[Row]:
     finally:
         for owner, method, original in originals:
             setattr(owner, method, original)
-        photographer.close()
     yield Row(f"{name}: one image, processor time", total / len(jobs) * 1e3, "ms", cases=len(jobs))
     for label, *_ in parts:
         yield Row(f"{name}: {label}", spent[label] / len(jobs) * 1e3, "ms", cases=len(jobs))
@@ -218,11 +217,11 @@ def _timed(original: Callable[..., Any], label: str, spent: dict[str, float]) ->
 def _drawn(staged: Staged, jobs: list[ImageJob]) -> tuple[float, float]:
     """Mean numbers of objects and triangles that are in view."""
     objects, triangles = [], []
-    with Renderer(staged.scenario, staged.objects) as renderer:
-        for job in jobs[::10]:
-            visible = renderer.draw(job.view).visible
-            objects.append(len(visible))
-            triangles.append(sum(len(part.faces) for one in visible for part in one.placed.asset.parts))
+    renderer = Renderer(staged.scenario, staged.objects)
+    for job in jobs[::10]:
+        visible = renderer.draw(job.view).visible
+        objects.append(len(visible))
+        triangles.append(sum(len(part.faces) for one in visible for part in one.placed.asset.parts))
     return float(np.mean(objects)), float(np.mean(triangles))
 
 

@@ -76,15 +76,15 @@ def _world(
         )
     )
     optics = Optics(scenario.camera, Intrinsics.of(scenario.camera).focal_px, scenario.seed)
-    with Renderer(scenario, objects) as renderer:
-        for number, placed in enumerate(objects * _SIDES):
-            side = rng.uniform(*(_FRONT_RAD * np.array([-1, 1]) if class_name in _SEEN_FROM_FRONT else (0, 2 * np.pi)))
-            view = _towards(placed.route_xy[0], placed.yaw_rad + side, rng.uniform(*distances_m), rng)
-            rendered = renderer.draw(view)
-            truth = true_detections(rendered, renderer, view, 0)
-            if len(truth.ids) and truth.hypotheses[0][0][1] >= least_share:
-                image = optics.developed(optics.expose(rendered.image, number, 0.0))
-                yield View(image, class_name, truth.boxes_xyxy[0])
+    renderer = Renderer(scenario, objects)
+    for number, placed in enumerate(objects * _SIDES):
+        side = rng.uniform(*(_FRONT_RAD * np.array([-1, 1]) if class_name in _SEEN_FROM_FRONT else (0, 2 * np.pi)))
+        view = _towards(placed.route_xy[0], placed.yaw_rad + side, rng.uniform(*distances_m), rng)
+        rendered = renderer.draw(view)
+        truth = true_detections(rendered, renderer, view, 0)
+        if len(truth.ids) and truth.hypotheses[0][0][1] >= least_share:
+            image = optics.developed(optics.expose(rendered.image, number, 0.0))
+            yield View(image, class_name, truth.boxes_xyxy[0])
 
 
 def _towards(object_xy: NDArray[np.float64], from_rad: float, distance_m: float, rng: np.random.Generator) -> Viewpoint:

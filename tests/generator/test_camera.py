@@ -1,7 +1,5 @@
 """Images and their truth: boxes lie where CameraInfo and extrinsics project the objects, and shares are right."""
 
-from collections.abc import Iterator
-
 import cv2
 import numpy as np
 import pytest
@@ -36,12 +34,11 @@ objects = [
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Staged, Renderer]]:
+def scene(tmp_path_factory: pytest.TempPathFactory) -> tuple[Staged, Renderer]:
     path = tmp_path_factory.mktemp("scene") / "scene.toml"
     path.write_text(SCENE)
     staged = stage(load_scenario(str(path)))
-    with Renderer(staged.scenario, staged.objects) as renderer:
-        yield staged, renderer
+    return staged, Renderer(staged.scenario, staged.objects)
 
 
 def view_from(x: float, y: float, heading_deg: float) -> Viewpoint:
@@ -186,12 +183,12 @@ def test_objects_that_walk_are_seen_where_they_are(stage_text: StageText) -> Non
         'objects = [ { class = "person", variant = "legs", at = [6.0, 2.0], walk = [[6.0, -2.0]], speed_mps = 1.0 } ]\n'
     )
     start = view_from(0.0, 0.0, 0.0)
-    with Renderer(staged.scenario, staged.objects) as renderer:
-        centres = []
-        for time_s in (0.0, 1.0, 4.0, 6.0):
-            view = Viewpoint(start.eye_m, start.world_from_optical, time_s)
-            box = true_detections(renderer.draw(view), renderer, view, 0).boxes_xyxy[0]
-            centres.append((box[0] + box[2]) / 2)
+    renderer = Renderer(staged.scenario, staged.objects)
+    centres = []
+    for time_s in (0.0, 1.0, 4.0, 6.0):
+        view = Viewpoint(start.eye_m, start.world_from_optical, time_s)
+        box = true_detections(renderer.draw(view), renderer, view, 0).boxes_xyxy[0]
+        centres.append((box[0] + box[2]) / 2)
     expected = 320 - 530.5 * np.array([2.0, 1.0, -2.0, 0.0]) / (6.0 - CAMERA_IN_BASE_M[0])
     assert centres == pytest.approx(expected, abs=12)
 

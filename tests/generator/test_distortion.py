@@ -36,7 +36,6 @@ height_px = 240
 def taken(staged: Staged, job: ImageJob) -> tuple[CameraInfo, Detections]:
     photographer = Photographer(staged)
     _, info, truth = (stamped.message for stamped in photographer.take(job))
-    photographer.close()
     assert isinstance(info, CameraInfo)
     assert isinstance(truth, Detections)
     return info, truth

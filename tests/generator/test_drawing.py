@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("pybullet", reason="needs the extra 'generator'")
 
-from mcap_landmarks_generator.assets import section
+from mcap_landmarks_generator.assets import catalog, section
 from mcap_landmarks_generator.assets.asset import Asset, assemble
 from mcap_landmarks_generator.assets.shapes import box
 from mcap_landmarks_generator.camera import Intrinsics, Viewpoint
@@ -92,3 +92,31 @@ def test_nothing_to_draw_is_an_empty_window() -> None:
     colours, ids = drawn([])
     assert (ids == -1).all()
     assert (colours == 255).all()
+
+
+def towards(asset: Asset, distance_m: float, height_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """An asset at the origin, seen from its front at a height."""
+    placed = PlacedObject("one", asset, np.zeros((1, 2)), 0.0, 0.0)
+    eye, target = np.array([distance_m, 0.0, height_m]), np.array([0.0, 0.0, height_m])
+    view = Viewpoint.towards(eye, target, np.array([0.0, 0.0, 1.0]))
+    colours, ids = Drawing(CAMERA, LightSpec(azimuth_deg=0.0)).render(view, [placed], WHOLE, 1.0)
+    return colours.astype(int), ids
+
+
+def test_sign_and_pole_are_told_apart() -> None:
+    asset = catalog.build("stop sign", seed=1)
+    colours, ids = towards(asset, 3.0, 1.6)
+    labelled = np.array([part.labelled for part in asset.parts])
+    sign, pole = (np.isin(ids, np.flatnonzero(labelled == which)) for which in (True, False))
+    red = colours[sign]
+    assert np.mean(red[:, 0] > red[:, 1] + 60) > 0.5
+    assert np.mean(red.min(axis=1) > 120) > 0.1
+    assert np.nonzero(sign)[0].max() < np.median(np.nonzero(pole)[0])
+
+
+def test_lamps_stand_red_above_green() -> None:
+    asset = catalog.build("traffic light", seed=2)
+    colours, _ = towards(asset, 2.5, float(asset.parts[0].vertices[:, 2].mean()))
+    reddish = np.nonzero(colours[..., 0] > colours[..., 1:].max(axis=2) + 15)[0]
+    greenish = np.nonzero(colours[..., 1] > colours[..., [0, 2]].max(axis=2) + 15)[0]
+    assert reddish.mean() < greenish.mean() - 10

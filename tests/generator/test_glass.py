@@ -58,8 +58,9 @@ def test_what_is_behind_glass_is_a_little_darker(stage_text: StageText) -> None:
 def test_cameras_see_the_frame_only(stage_text: StageText) -> None:
     staged = stage_text(SCENE)
     view = view_from(0.0, 0.0, 0.0)
-    with Renderer(staged.scenario, staged.objects) as both, Renderer(staged.scenario, staged.objects[1:]) as without:
-        seen, bare = both.draw(view).image, without.draw(view).image
+    both = Renderer(staged.scenario, staged.objects)
+    without = Renderer(staged.scenario, staged.objects[1:])
+    seen, bare = both.draw(view).image, without.draw(view).image
     inside = np.abs(seen[60:100, 40:280].astype(int) - bare[60:100, 40:280])
     # Another window is drawn, and its rounding differs.
     assert inside.max() <= 1

@@ -40,7 +40,6 @@ def test_each_camera_has_its_topics_and_sees_what_is_before_it(staged: Staged) -
     jobs = {event.camera: event for event in events if isinstance(event, ImageJob)}
     photographer = Photographer(staged)
     taken = {number: photographer.take(jobs[number]) for number in (0, 1)}
-    photographer.close()
     assert taken[0][0].channel is CAMERA_IMAGE
     assert [stamped.channel.topic for stamped in taken[1]] == [
         "/left/image_raw/compressed",

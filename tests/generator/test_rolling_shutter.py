@@ -45,14 +45,15 @@ def middles_of_rows(mask: np.ndarray) -> np.ndarray:
 
 def test_a_turn_leans_what_stands_upright(stage_text: StageText) -> None:
     staged = stage_text(ROLLING)
-    with Renderer(staged.scenario, staged.objects) as plain, LensRenderer(staged.scenario, staged.objects) as rolling:
-        view = view_from(0.0, 0.0, 0.0)
-        still, straight = rolling.draw(view, turning(0.0)), plain.draw(view)
-        lean = rolling.draw(view, turning(TURN_RADPS))
-        boxes = [
-            true_detections(drawn, by, view, 0).boxes_xyxy[0]
-            for drawn, by in ((straight, plain), (still, rolling), (lean, rolling))
-        ]
+    plain = Renderer(staged.scenario, staged.objects)
+    rolling = LensRenderer(staged.scenario, staged.objects)
+    view = view_from(0.0, 0.0, 0.0)
+    still, straight = rolling.draw(view, turning(0.0)), plain.draw(view)
+    lean = rolling.draw(view, turning(TURN_RADPS))
+    boxes = [
+        true_detections(drawn, by, view, 0).boxes_xyxy[0]
+        for drawn, by in ((straight, plain), (still, rolling), (lean, rolling))
+    ]
     assert boxes[1] == pytest.approx(boxes[0], abs=0.5)
     assert np.abs(still.image.astype(int) - straight.image).mean() < 2
     upright, leaning = middles_of_rows(still.body_ids >= 0), middles_of_rows(lean.body_ids >= 0)
@@ -85,7 +86,6 @@ def test_the_stamp_is_of_the_first_row(stage_text: StageText) -> None:
         assert job.log_time_ns == job.stamp_ns + 50_000_000
     photographer = Photographer(staged)
     first, again = photographer.take(jobs[1]), photographer.take(jobs[1])
-    photographer.close()
     for one, other in zip(first, again, strict=True):
         if isinstance(one.message, CompressedImage):
             assert isinstance(other.message, CompressedImage)

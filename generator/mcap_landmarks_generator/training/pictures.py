@@ -57,23 +57,23 @@ def render(one: Scene, exposed: bool) -> Iterator[Picture]:
     spec = one.scenario.camera
     optics = Optics(spec, Intrinsics.of(spec).focal_px, one.scenario.seed)
     places = {placed.object_id: placed.route_xy[0] for placed in one.objects}
-    with Renderer(one.scenario, one.objects) as renderer:
-        for index, view in enumerate(one.views):
-            rendered = renderer.draw(view)
-            truth = true_detections(rendered, renderer, view, 0)
-            away = np.array([places[name] - view.eye_m[:2] for name in truth.ids]).reshape(-1, 2)
-            labels = Labels(
-                np.array([COCO_ID[options[0][0]] for options in truth.hypotheses], np.int64),
-                truth.boxes_xyxy,
-                np.array([options[0][1] for options in truth.hypotheses]),
-                np.hypot(away[:, 0], away[:, 1]),
-            )
-            image = rendered.image
-            ahead = away @ view.world_from_optical[:2, [0, 2]]
-            bearings_rad = np.arctan2(-ahead[:, 0], ahead[:, 1])
-            if exposed:
-                image = optics.developed(optics.expose(image, index, 0.0))
-            yield Picture(image, _cover(rendered), labels, bearings_rad)
+    renderer = Renderer(one.scenario, one.objects)
+    for index, view in enumerate(one.views):
+        rendered = renderer.draw(view)
+        truth = true_detections(rendered, renderer, view, 0)
+        away = np.array([places[name] - view.eye_m[:2] for name in truth.ids]).reshape(-1, 2)
+        labels = Labels(
+            np.array([COCO_ID[options[0][0]] for options in truth.hypotheses], np.int64),
+            truth.boxes_xyxy,
+            np.array([options[0][1] for options in truth.hypotheses]),
+            np.hypot(away[:, 0], away[:, 1]),
+        )
+        image = rendered.image
+        ahead = away @ view.world_from_optical[:2, [0, 2]]
+        bearings_rad = np.arctan2(-ahead[:, 0], ahead[:, 1])
+        if exposed:
+            image = optics.developed(optics.expose(image, index, 0.0))
+        yield Picture(image, _cover(rendered), labels, bearings_rad)
 
 
 def painted(seed: int, index: int) -> Picture:
