@@ -107,7 +107,7 @@ def test_examples_depend_on_their_step_only_and_change_size_by_phase(folder: Pat
 @pytest.mark.slow
 def test_targets_lie_in_their_example(folder: Path) -> None:
     examples = Examples(PictureSet(folder), (Phase(6, 8, 320, 320),), 1)
-    targets = np.concatenate([examples[step].targets for step in range(2)])
+    targets = np.concatenate([examples[step].targets for step in range(4)])
     assert len(targets) > 20
     assert set(targets[:, 0]) <= set(range(8))
     assert set(targets[:, 1]) <= set(range(len(CLASS_IDS)))
