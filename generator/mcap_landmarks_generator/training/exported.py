@@ -63,7 +63,7 @@ def calibrate(network: Network, examples: Examples) -> None:
         norm = block.norm
         assert norm.running_mean is not None and norm.running_var is not None  # noqa: S101, PT018 - it keeps both
         scale = norm.weight / (norm.running_var + norm.eps).sqrt()
-        norm.bias += scale * (mean - norm.running_mean)
+        norm.bias.add_(scale * (mean - norm.running_mean))
         norm.running_mean.copy_(mean)
         norm.running_var.copy_(square - mean**2)
         norm.weight.copy_(scale * (norm.running_var + norm.eps).sqrt())
