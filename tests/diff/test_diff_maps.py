@@ -103,6 +103,29 @@ def test_alignment_is_a_choice(tmp_path: Path) -> None:
     assert document["alignment"]["heading_deg"] == pytest.approx(-np.degrees(0.7))
 
 
+def test_what_moved_in_between_does_not_turn_the_map(tmp_path: Path) -> None:
+    """The one suitcase of each map stands elsewhere months later, though no class is rarer."""
+    rng = np.random.default_rng(4)
+    kinds = ("suitcase", "bench", *("fire hydrant",) * 3, *("potted plant",) * 3)
+    places = rng.uniform(-15, 15, (len(kinds), 2))
+    later = places + np.eye(len(kinds), 1) * [9.0, 4.0] + np.eye(len(kinds), 1, -1) * [-1.6, 0.5]
+    for name, points in (("a.db", places), ("b.db", later)):
+        write_map(tmp_path / name, landmarks_at(points, kinds, MOVE if name == "b.db" else None))
+    document = diff(tmp_path / "a.db", tmp_path / "b.db", ["landmarks.position_m=1e-6"], aligned=True).document
+    assert document["alignment"]["heading_deg"] == pytest.approx(-np.degrees(0.7), abs=1e-6)
+    assert counts(document["channels"]["landmarks"]) == (6, 0, 2, 2)
+
+
+def landmarks_at(points: np.ndarray, classes: tuple[str, ...], move: np.ndarray | None) -> LandmarkMap:
+    """Landmarks of a map, on request in another frame."""
+    count = len(points)
+    whole = LandmarkMap(
+        tuple(f"l{number}" for number in range(count)), classes, points, np.zeros((count, 2, 2)),
+        np.full(count, 0.2), np.full(count, 9), np.zeros(count, dtype=np.bool_),
+    )  # fmt: skip
+    return whole if move is None else moved(whole, move)
+
+
 def test_settings_were_meant_to_differ(tmp_path: Path) -> None:
     for name, sigma_m in (("a.db", 0.05), ("b.db", 0.1)):
         manifest = Manifest("map", {"build_map": {"range_sigma_m": sigma_m}}).entries()

@@ -14,10 +14,11 @@ from mcap_landmarks.diff.fields import Batch, Fields, texts
 from mcap_landmarks.diff.pairs import Pairs, pair_keys, pair_points
 from mcap_landmarks.diff.tally import Tally
 from mcap_landmarks.diff.values import Flags
-from mcap_landmarks.evaluation.alignment import fit
-from mcap_landmarks.evaluation.landmark_metrics import associate
+from mcap_landmarks.evaluation.alignment import fit, search
+from mcap_landmarks.evaluation.landmark_metrics import GATE_M, associate
 from mcap_landmarks.evaluation.pose_metrics import align
 from mcap_landmarks.geometry.se2 import Array, compose, rotation, transform_points
+from mcap_landmarks.mapping.common_frame import align as align_points
 from mcap_landmarks.maps.model import Group, LandmarkMap
 from mcap_landmarks.messages.columns import Column, Kind
 from mcap_landmarks.messages.scene import SceneObjects
@@ -28,6 +29,10 @@ FIELDS = {
     "groups": ("order", "position_m", "heading_rad", "covariance"),
 }
 """What is compared of a map."""
+
+
+_CONSENSUS = 3
+"""So many landmarks that agree are more than chance: any two agree after some motion."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,8 +58,7 @@ def diff_maps(
     """
     transform = None
     if aligned:
-        left, right = associate(_scene(baseline), _scene(candidate))
-        transform = fit(candidate.positions_xy[right], baseline.positions_xy[left])
+        transform = _baseline_from(candidate, baseline)
         candidate = moved(candidate, transform)
     landmarks = ChannelDiff("landmark", partial(tolerance, "landmarks"), "landmarks")
     pairs = pair_points(
@@ -96,6 +100,17 @@ def moved(landmark_map: LandmarkMap, dst_from_map: Array) -> LandmarkMap:
         covariances=turn @ landmark_map.covariances @ turn.T,
         groups=tuple(groups),
     )
+
+
+def _baseline_from(candidate: LandmarkMap, baseline: LandmarkMap) -> Array:
+    """The transform (3,) under which most landmarks of two maps agree; what moved in between has no say in it."""
+    same_class = np.array(candidate.classes, dtype=np.str_)[:, None] == np.array(baseline.classes, dtype=np.str_)
+    _, partner = search(candidate.positions_xy, baseline.positions_xy, same_class, GATE_M / 3)
+    right, left = np.flatnonzero(partner >= 0), partner[partner >= 0]
+    if len(right) >= _CONSENSUS:
+        return align_points(candidate.positions_xy[right], baseline.positions_xy[left])
+    left, right = associate(_scene(baseline), _scene(candidate))
+    return fit(candidate.positions_xy[right], baseline.positions_xy[left])
 
 
 def _tally(tally: Tally, baseline: Batch, candidate: Batch, pairs: Pairs, ids: Flags | None = None) -> None:
