@@ -86,7 +86,9 @@ def _outcome(
     method: str, folder: Path, maps: tuple[Path, Path], asked: tuple[Path, Path], model: list[str], figures: Path | None
 ) -> Outcome:
     """One method on the logs to map and those to localize, each without and with drift."""
-    database, built, result, alone = (folder / name for name in ("map.db", "built.mcap", "result.mcap", "alone.mcap"))
+    own = folder / method
+    own.mkdir()
+    database, built, result, alone = (own / name for name in ("map.db", "built.mcap", "result.mcap", "alone.mcap"))
     given, stops = [*METHODS[method], *model], stops_of(asked[0])
     call("map", maps[0], "--map", database, "-o", built, *given, *(PERFECT if method == "default" else []))
     groups = groups_mapped(database, maps[0], aligned=False)
