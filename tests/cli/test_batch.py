@@ -10,13 +10,13 @@ import pytest
 from mcap_landmarks.channels import ODOMETRY
 from mcap_landmarks.cli.batch_events import EventLines
 from mcap_landmarks.cli.batch_options import BatchOptions
-from mcap_landmarks.cli.batch_reports import Report, say_pace
+from mcap_landmarks.cli.batch_reports import Report
 from mcap_landmarks.cli.batch_run import run_batch
-from mcap_landmarks.cli.batch_table import LiveTable
+from mcap_landmarks.cli.batch_table import LiveTable, say_pace
 from mcap_landmarks.cli.batch_tasks import tasks_of
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.fleet.cuts import over_memory
-from mcap_landmarks.fleet.recorded_hours import recorded_hours
+from mcap_landmarks.fleet.recorded_time import recorded_s
 from mcap_landmarks.fleet.tasks import Ended, Started, Task, TaskLimits
 from mcap_landmarks.recording.reader import open_recording
 
@@ -84,7 +84,7 @@ def test_one_that_fails_does_not_stop_the_others(
     assert call("batch", "localize", *(folder / "logs" / f"{name}.mcap" for name in ("a", "b")), *words) == 0
     printed = capsys.readouterr().out
     assert "2 skipped" in printed
-    assert "hours of recording" not in printed, "nothing was worked on"
+    assert " of recording in " not in printed, "nothing was worked on"
 
 
 @pytest.mark.slow
@@ -284,13 +284,13 @@ def test_events_are_lines_that_are_there_at_once(tmp_path: Path) -> None:
     ]
 
 
-def test_the_pace_is_told_in_hours_of_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_pace_is_told_by_how_long_recordings_last(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log, none = write(tmp_path / "a.mcap", messages(count=61)), tmp_path / "none.mcap"
     none.touch()
     whole, part = Task(log, none, ("cluster",)), Task(log, none, ("cluster", "--end=1"))
-    assert recorded_hours([whole, whole, part, Task(none, log, ("cluster",))]) * 3600 == pytest.approx(60.0)
-    say_pace(2.0, 1800.0)
-    assert capsys.readouterr().out == "2.00 hours of recording in 0.50 hours: 4.0 an hour\n"
+    assert recorded_s([whole, whole, part, Task(none, log, ("cluster",))]) == pytest.approx(60.0)
+    say_pace(7200.0, 1800.0)
+    assert capsys.readouterr().out == "2:00:00 of recording in 30:00: 4.0 times as fast as it lasts\n"
 
 
 class Stopped:

@@ -9,7 +9,7 @@ import typer
 from mcap_landmarks.cli import options
 from mcap_landmarks.cli.batch_map import map_logs
 from mcap_landmarks.cli.batch_options import BatchOptions
-from mcap_landmarks.cli.batch_reports import Report, counts_of, print_reports, say_errors, say_pace
+from mcap_landmarks.cli.batch_reports import Report, counts_of, print_reports, say_errors
 from mcap_landmarks.cli.batch_tasks import VERBS, tasks_of
 from mcap_landmarks.cli.console import PARTIAL, UNUSABLE, say_json, warn
 from mcap_landmarks.errors import UsageError
@@ -71,7 +71,8 @@ def command(
     if json:
         say_json("batch", {"verb": verb, **counts, "logs": reports})
     elif not batch.prints_events:
-        _print(verb, tasks, reports, took_s)
+        print_reports(verb, reports, counts)
+        _tell_pace(tasks, reports, took_s)
     say_errors(reports)
     if counts["failed"] == len(reports):
         raise typer.Exit(UNUSABLE)
@@ -79,9 +80,9 @@ def command(
         raise typer.Exit(PARTIAL)
 
 
-def _print(verb: str, tasks: "Sequence[Task]", reports: Sequence[Report], took_s: float) -> None:
-    from mcap_landmarks.fleet.recorded_hours import recorded_hours
+def _tell_pace(tasks: "Sequence[Task]", reports: Sequence[Report], took_s: float) -> None:
+    from mcap_landmarks.cli.batch_table import say_pace
+    from mcap_landmarks.fleet.recorded_time import recorded_s
 
-    print_reports(verb, reports, counts_of(reports))
     pairs = zip(tasks, reports, strict=True)
-    say_pace(recorded_hours(task for task, report in pairs if report["outcome"] in {"done", "partial"}), took_s)
+    say_pace(recorded_s(task for task, report in pairs if report["outcome"] in {"done", "partial"}), took_s)

@@ -130,12 +130,6 @@ def print_reports(verb: str, reports: Sequence[Report], counts: Mapping[str, int
     say(", ".join(f"{count} {name}" for name, count in counts.items() if count))
 
 
-def say_pace(hours: float, took_s: float) -> None:
-    """How many hours of recording were worked on, and how many that makes an hour; nothing where none can be told."""
-    if hours > 0:
-        say(f"{hours:.2f} hours of recording in {took_s / 3600:.2f} hours: {3600 * hours / took_s:.1f} an hour")
-
-
 _FIGURES: dict[str, dict[str, tuple[str, ...]]] = {
     "convert": {"messages": ("read",), "lost": ("lost",)},
     "map": {"bundles": ("bundles",)},

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from mcap_landmarks.cli.batch_reports import OUTCOMES, BatchOutcome, Report
-from mcap_landmarks.cli.console import harmless, warn
+from mcap_landmarks.cli.console import harmless, say, warn
 from mcap_landmarks.fleet.tasks import Ended, Task
 
 if TYPE_CHECKING:
@@ -67,6 +67,12 @@ def _clock(seconds: float) -> str:
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def say_pace(lasts_s: float, took_s: float) -> None:
+    """How long the recordings last that were worked on, and how fast that went; nothing where it cannot be told."""
+    if lasts_s > 0:
+        say(f"{_clock(lasts_s)} of recording in {_clock(took_s)}: {lasts_s / took_s:.1f} times as fast as it lasts")
 
 
 @contextlib.contextmanager

@@ -9,11 +9,10 @@ from mcap_landmarks.fleet.tasks import Task
 from mcap_landmarks.recording.reader import open_recording
 
 _SPANS = ("--start", "--end")
-_NS_PER_HOUR = 3_600 * 10**9
 
 
-def recorded_hours(tasks: Iterable[Task]) -> float:
-    """The hours of log time that the recordings of some tasks span.
+def recorded_s(tasks: Iterable[Task]) -> float:
+    """The seconds of log time that the recordings of some tasks span.
 
     Logs of other formats and at URLs count as none, and so do those of which only a part is read: to look into them
     would take longer than the figure is worth.
@@ -25,4 +24,4 @@ def recorded_hours(tasks: Iterable[Task]) -> float:
         with contextlib.suppress(ToolkitError, OSError), open_recording(task.log) as recording:
             if recording.start_ns is not None and recording.end_ns is not None:
                 total_ns += recording.end_ns - recording.start_ns
-    return total_ns / _NS_PER_HOUR
+    return total_ns / 1e9
