@@ -71,11 +71,13 @@ def bound_images() -> None:
     os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(1 << 26))
 
 
+@cache
 def keep_room() -> None:
     """Let freed chunks leave their memory to the next ones; to get it anew takes as long as to read them.
 
     What glibc (malloc.c, "dynamic mmap threshold") does with a block that it gives back to the system when it is freed:
-    it keeps blocks up to that size from then on, twice as much in all. Elsewhere nothing changes.
+    it keeps blocks up to that size from then on, twice as much in all; once for a process, as a second such block would
+    be filled with zeros. Elsewhere nothing changes.
     """
     bytes(_KEPT)
 

@@ -10,7 +10,7 @@ import zstandard
 
 from mcap_landmarks import memory
 from mcap_landmarks.recording.checksum import crc32
-from mcap_landmarks.recording.container import CHUNK, LARGEST_CHUNK, RECORD, Opcode, read_up_to
+from mcap_landmarks.recording.container import CHUNK, LARGEST_CHUNK, RECORD, Opcode
 from mcap_landmarks.recording.summary_index import Block
 
 
@@ -118,13 +118,13 @@ def records_in(content: memoryview) -> Iterator[tuple[int, int, int]]:
 
 
 def block_content(stream: BinaryIO, block: Block, *, verify: bool) -> memoryview:
-    """The uncompressed records of a block.
+    """The uncompressed records of a block, whose length is known to be one that the file has.
 
     Raises:
         DamagedBlockError: the block cannot be trusted.
     """
     stream.seek(block.offset)
-    raw = read_up_to(stream, block.length)
+    raw = stream.read(block.length)
     if len(raw) < block.length:
         raise DamagedBlockError("the file ends within it")
     if block.head:

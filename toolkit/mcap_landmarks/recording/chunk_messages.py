@@ -57,6 +57,11 @@ def _begins_small(content: memoryview) -> bool:
     return len(content) >= RECORD.size and RECORD.unpack_from(content)[1] <= _SMALL_BYTES
 
 
+def is_alone(messages: Sequence[RawMessage], first_ns: int, last_ns: int, next_ns: int) -> bool:
+    """Whether all of a block's messages lie in the stretch from `first_ns` to `last_ns`, and before the next block."""
+    return bool(messages) and messages[0].log_time_ns >= first_ns and messages[-1].log_time_ns < min(last_ns, next_ns)
+
+
 def push(active: Open, number: int, messages: Sequence[RawMessage], first_ns: int, last_ns: int) -> None:
     """Open a block: its messages from `first_ns` on and before `last_ns`, which are in the order of time."""
     if not messages:

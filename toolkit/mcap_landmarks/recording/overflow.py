@@ -46,11 +46,14 @@ class Overflow:
         Raises:
             RecordingError: there is no room for those that cannot be held.
         """
+        if not active:
+            self._held, self._spilled = {number: size + _MESSAGE_BYTES * len(messages)}, set()
+            return messages
         is_open = {entry[1] for entry in active}
         self._held = {key: held for key, held in self._held.items() if key in is_open}
         self._spilled &= is_open
         weight = size + _MESSAGE_BYTES * len(messages)
-        if not active or sum(self._held.values()) + weight <= self._bound:
+        if sum(self._held.values()) + weight <= self._bound:
             self._held[number] = weight
             return messages
         try:

@@ -19,7 +19,7 @@ from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.blocks import DamagedBlockError, block_content
 from mcap_landmarks.recording.channel_columns import ChannelColumns, GatheredBlocks, Wanted, rows_in
 from mcap_landmarks.recording.chunk_copy import WholeChunk, read_whole
-from mcap_landmarks.recording.chunk_messages import Open, drain, push
+from mcap_landmarks.recording.chunk_messages import Open, drain, is_alone, push
 from mcap_landmarks.recording.container import parse
 from mcap_landmarks.recording.content_hash import has_every_crc, hash_of
 from mcap_landmarks.recording.damage import SuspectChunk
@@ -289,9 +289,14 @@ class Recording:
         """Messages in the order of time, in runs of one block; blocks may overlap."""
         active: Open = []
         meant = self._blocks(wanted, *within_ns)
+        nexts_ns = [*(block.start_ns for block in meant[1:]), 2**64]
         with reading(self._stream, meant) as blocks, Overflow(self.path) as overflow:
             for number, block in enumerate(blocks):
-                yield from drain(active, block.start_ns)
+                if active:
+                    yield from drain(active, block.start_ns)
                 found, size = self._load(block, wanted, progress)
-                push(active, number, overflow.kept(active, number, found, size), *within_ns)
+                if not active and is_alone(found, *within_ns, nexts_ns[number]):
+                    yield found
+                else:
+                    push(active, number, overflow.kept(active, number, found, size), *within_ns)
             yield from drain(active, 2**64)
