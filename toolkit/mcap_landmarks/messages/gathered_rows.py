@@ -1,5 +1,6 @@
 """Rows of many tables as those of one, in any order."""
 
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,9 @@ class Gathered:
             return
         self._rows += table.rows
         for name, column in table.columns.items():
-            self._values[name].add(column.values, len(column.values) * self._expected // table.rows)
+            values = column.values
+            count = len(values) if values.ndim < 3 else len(values) * values.shape[1]
+            self._values[name].add(values, count * self._expected // table.rows)
             if column.counts is not None:
                 self._counts[name].add(column.counts, self._expected)
 
@@ -57,15 +60,19 @@ class Room:
         return self._array[: self._used]
 
     def add(self, values: NDArray[Any], expected: int) -> None:
-        """Take the next values; so many are expected in all, which is told by those who may be wrong."""
-        end = self._used + len(values)
+        """Take the next values; so many are expected in all, which is told by those who may be wrong.
+
+        Those of rows that have as many each may come as (N, count, k).
+        """
+        shape = values.shape if values.ndim < 3 else (len(values) * values.shape[1], values.shape[2])
+        end = self._used + shape[0]
         if not self._used or end > len(self._array):
-            most = _MOST_ROOM // max(values[:1].nbytes, 1)
-            grown = np.empty((max(2 * self._used, end, min(expected, most)), *values.shape[1:]), values.dtype)
+            most = _MOST_ROOM // max(values.dtype.itemsize * prod(shape[1:]), 1)
+            grown = np.empty((max(2 * self._used, end, min(expected, most)), *shape[1:]), values.dtype)
             if self._used:
                 grown[: self._used] = self.filled
             self._array = grown
-        self._array[self._used : end] = values
+        self._array[self._used : end].reshape(values.shape)[...] = values
         self._used = end
 
 

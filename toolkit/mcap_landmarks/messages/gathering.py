@@ -58,10 +58,13 @@ class PlacedMessages:
         return every[self.starts]
 
     def gather_many(self, offset: int, dtype: np.dtype[Any], count: int) -> NDArray[Any]:
-        """So many values (N, count) in each of them from an offset on."""
+        """So many values (N, count) in each of them from an offset on: in the buffer itself where there is a step."""
         width = count * dtype.itemsize
-        if not width:
+        if not width or not len(self):
             return np.zeros((len(self), count), dtype)
+        if self.step:
+            first = int(self.starts[0]) + offset
+            return np.ndarray((len(self), count), dtype, self.content, first, (self.step, dtype.itemsize))
         found = np.ascontiguousarray(self.gather(offset, np.dtype(f"V{width}")))
         return found.view(dtype).reshape(len(self), count)
 
@@ -76,7 +79,7 @@ class _Place:
 
 
 @dataclass(frozen=True, slots=True)
-class _Form:
+class Form:
     """One way in which messages of a type are laid out: their size, the lengths at some offsets, the places."""
 
     size: int
@@ -111,13 +114,18 @@ class _Form:
         return table
 
 
-def read_placed(layout: Layout, messages: PlacedMessages, fields: Collection[str]) -> tuple[Table, NDArray[np.bool_]]:
+def read_placed(
+    layout: Layout, messages: PlacedMessages, fields: Collection[str], known: list[Form] | None = None
+) -> tuple[Table, NDArray[np.bool_]]:
     """Columns of messages by the names of their fields, and which messages (N,) could be read: others have no rows.
 
-    What `Layout.table` gives of them in little endian, but for the elements of sequences of messages.
+    What `Layout.table` gives of them in little endian, but for the elements of sequences of messages. Values may lie in
+    the messages' buffer, and are of shape (N, count, k) where each row has as many: `Gathered` copies them from there.
+    `known` keeps the form that messages had for the next ones.
     """
     wanted = frozenset(fields)
-    parts, rest = _groups(layout, messages, wanted)
+    known = [] if known is None else known
+    parts, rest = _groups(layout, messages, wanted, known)
     if len(parts) == 1 and parts[0][1].rows == len(messages):
         return parts[0][1], np.ones(len(messages), dtype=np.bool_)
     for begin in range(0, len(rest), _AT_ONCE):
@@ -133,18 +141,20 @@ def read_placed(layout: Layout, messages: PlacedMessages, fields: Collection[str
 
 
 def _groups(
-    layout: Layout, messages: PlacedMessages, fields: Collection[str]
+    layout: Layout, messages: PlacedMessages, fields: Collection[str], known: list[Form]
 ) -> tuple[list[tuple[Indices, Table]], Indices]:
     """The rows and the table of each group of messages that are laid out alike, and the rows of all others."""
     rest = np.arange(len(messages), dtype=np.int64)
     found: list[tuple[Indices, Table]] = []
     for _ in range(_MOST_FORMS):
-        form = _form(layout, messages.data(int(rest[0]))) if len(rest) else None
+        form = known.pop() if known else None
+        form = form or (_form(layout, messages.data(int(rest[0]))) if len(rest) else None)
         if form is None:
             break
         alike = messages if len(rest) == len(messages) else messages.at(rest)
         fits = form.fits(alike)
         if fits.all():
+            known.append(form)
             return [*found, (rest, form.table(alike, fields))], rest[:0]
         rows, rest = rest[fits], rest[~fits]
         found.append((rows, form.table(messages.at(rows), fields)))
@@ -176,14 +186,14 @@ def empty_table(layout: Layout, fields: Collection[str] | None = None) -> Table:
     wanted = layout.columns if fields is None else tuple(fields)
     if unknown := [name for name in wanted if name not in layout.columns]:
         raise MessageError(f"{layout.ros_type} has no field {unknown[0]!r} that makes a column")
-    return _some(layout.table([]), wanted)
+    return _some(layout.empty, wanted)
 
 
 def _some(table: Table, fields: Collection[str]) -> Table:
     return Table(table.rows, {name: column for name, column in table.columns.items() if name in fields}, {})
 
 
-def _form(layout: Layout, data: bytes) -> _Form | None:
+def _form(layout: Layout, data: bytes) -> Form | None:
     """How a message is laid out; None if it does not fit its type, or has elements that are found one by one only."""
     places, lengths, position = list[_Place](), list[tuple[int, int]](), 0
     if data[:2] != LITTLE_ENDIAN:
@@ -204,7 +214,7 @@ def _form(layout: Layout, data: bytes) -> _Form | None:
     except struct_error:
         return None
     left = len(data) - _CDR_BYTES - position
-    return _Form(len(data), tuple(lengths), tuple(places)) if 0 <= left < 4 else None
+    return Form(len(data), tuple(lengths), tuple(places)) if 0 <= left < 4 else None
 
 
 def _span(part: Numbers | Moments | Text, position: int, count: int) -> tuple[int, int]:
@@ -230,7 +240,9 @@ def _add_numbers(table: Table, part: Numbers, place: _Place, messages: PlacedMes
             counts, width = np.full(len(messages), place.count, dtype=np.int64), place.count * part.width
         values = messages.gather_many(offset, part.dtype, width)
         values = values.view(np.uint8) if part.dtype == np.bool_ else values
-        table.columns[path] = Column(kind, values if counts is None else values.reshape(-1, part.width), counts)
+        if counts is not None:
+            values = values.reshape(len(messages), place.count, part.width)
+        table.columns[path] = Column(kind, values, counts)
 
 
 def _times(place: _Place, messages: PlacedMessages) -> Column:

@@ -30,7 +30,8 @@ _Flat = tuple[np.dtype[np.number], int, Kind]
 class Layout:
     """How messages of one type lie in CDR: `definition` are the fields of all types that it needs, by their names.
 
-    `parts` are what a message consists of, in the order of the bytes, `columns` the names of its table's columns.
+    `parts` are what a message consists of, in the order of the bytes, `empty` is the table of no message, `columns` the
+    names of its columns.
     `stamped` says whether each message begins with a time stamp, in its bytes 4 to 12; `has_payload` whether it
     carries bytes of some other format, as images do.
 
@@ -48,7 +49,8 @@ class Layout:
         except (TypesysError, KeyError, RecursionError, MessageError) as error:
             reason = error or type(error).__name__
             raise MessageError(f"{ros_type}: its schema cannot be understood ({reason})") from error
-        self.columns = tuple(self.table([]).columns)
+        self.empty = self.table([])
+        self.columns = tuple(self.empty.columns)
         self.stamped = isinstance(next(iter(self.parts), None), Moments)
         self.has_payload = any(isinstance(p, Numbers) and p.dtype in _BYTES and p.count is None for p in self.parts)
 

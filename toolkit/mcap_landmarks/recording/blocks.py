@@ -1,6 +1,7 @@
 """Blocks of a recording to records: decompress, check, part."""
 
 import io
+import threading
 from collections.abc import Iterator
 from struct import error as struct_error
 from typing import BinaryIO
@@ -12,6 +13,9 @@ from mcap_landmarks import memory
 from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.container import CHUNK, LARGEST_CHUNK, RECORD, Opcode
 from mcap_landmarks.recording.summary_index import Block
+
+
+_OF_THREAD = threading.local()
 
 
 class DamagedBlockError(ValueError):
@@ -86,7 +90,7 @@ def _decompress(compression: str, data: memoryview, size: int) -> memoryview:
         if compression == "zstd":
             if zstandard.frame_content_size(data) not in {-1, size}:
                 raise DamagedBlockError("its sizes contradict each other")
-            return memoryview(zstandard.ZstdDecompressor().decompress(data, max_output_size=size))
+            return memoryview(_decompressor().decompress(data, max_output_size=size))
         if compression == "lz4":
             stream = lz4.frame.LZ4FrameDecompressor()
             content = memoryview(stream.decompress(data, size))
@@ -96,6 +100,13 @@ def _decompress(compression: str, data: memoryview, size: int) -> memoryview:
     except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError) as error:
         raise DamagedBlockError(f"{compression} cannot decompress it") from error
     raise DamagedBlockError(f"its compression {compression!r} is unknown")
+
+
+def _decompressor() -> zstandard.ZstdDecompressor:
+    """The one of this thread: each serves one at a time, and takes a tenth as long to make as to unpack 1 MiB."""
+    if (found := getattr(_OF_THREAD, "zstd", None)) is None:
+        found = _OF_THREAD.zstd = zstandard.ZstdDecompressor()
+    return found
 
 
 def records_in(content: memoryview) -> Iterator[tuple[int, int, int]]:

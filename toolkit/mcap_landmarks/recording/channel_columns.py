@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mcap_landmarks.messages.columns import Table
 from mcap_landmarks.messages.gathered_rows import Gathered, Indices, Room, in_order
-from mcap_landmarks.messages.gathering import PlacedMessages, read_placed
+from mcap_landmarks.messages.gathering import Form, PlacedMessages, read_placed
 from mcap_landmarks.messages.layout import Layout
 from mcap_landmarks.recording.blocks import DamagedBlockError, records_in
 from mcap_landmarks.recording.container import MESSAGE, MESSAGE_FIXED, RECORD, Opcode
@@ -47,12 +47,16 @@ class BlockRows(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """Which messages are wanted: of a channel, from a log time on and before another; and what of them."""
+    """Which messages are wanted: of a channel, from a log time on and before another; and what of them.
+
+    `known` is for `read_placed`: the form of the last block's messages, which the next one's most often have, too.
+    """
 
     channel_id: int
     layout: Layout
     fields: Collection[str]
     within_ns: tuple[int, int]
+    known: list[Form]
 
 
 class GatheredBlocks:
@@ -94,7 +98,7 @@ def rows_in(stream: BinaryIO, block: Block, asked: Wanted, content: memoryview) 
         wanted &= (heads["log"] >= np.uint64(max(first_ns, 0))) & (heads["log"] <= np.uint64(last_ns - 1))
     sizes = heads["length"][wanted].astype(np.int64) - MESSAGE_FIXED
     messages = PlacedMessages(content, starts[wanted] + MESSAGE.size, sizes)
-    table, is_read = read_placed(asked.layout, messages, asked.fields)
+    table, is_read = read_placed(asked.layout, messages, asked.fields, asked.known)
     log, publish = (heads[name][wanted][is_read] for name in ("log", "publish"))
     return BlockRows(log, publish, table, len(messages) - table.rows)
 
@@ -114,7 +118,7 @@ def _rows_of_one_size(content: memoryview, asked: Wanted) -> BlockRows | None:
         return None
     starts = np.arange(first + MESSAGE.size, len(content) + MESSAGE.size, size)
     messages = PlacedMessages(content, starts, np.full(count, size - MESSAGE.size), size)
-    table, is_read = read_placed(asked.layout, messages, asked.fields)
+    table, is_read = read_placed(asked.layout, messages, asked.fields, asked.known)
     if table.rows < count:
         heads = heads[is_read]
     return BlockRows(heads["log"], heads["publish"], table, count - table.rows)
