@@ -10,15 +10,16 @@ import tomllib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import TypeVar
-
-from pydantic import TypeAdapter, ValidationError
+from typing import TYPE_CHECKING, TypeVar
 
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location, to_read
 from mcap_landmarks.sources import SOURCES, find_source, source_names
 from mcap_landmarks.stage import Config, Stage
 from mcap_landmarks.stages import STAGES, find_stage, stage_names, usable_stages
+
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
 
 _C = TypeVar("_C", bound=Config)
 Settings = dict[str, dict[str, object]]
@@ -127,6 +128,10 @@ def stage_config(config: type[_C], stage: str, settings: Mapping[str, object]) -
     Raises:
         UsageError: an unknown key (the nearest known one is named) or a value that does not fit.
     """
+    if not settings:
+        return config()
+    from pydantic import ValidationError  # noqa: PLC0415 - takes as long as to convert a small bag
+
     for key in settings:
         _known(key, [field.name for field in dataclasses.fields(config)], f"setting of {stage}")
     try:
@@ -143,8 +148,10 @@ def stage_config(config: type[_C], stage: str, settings: Mapping[str, object]) -
 
 
 @cache
-def _adapter(config: type[_C]) -> TypeAdapter[_C]:
+def _adapter(config: type[_C]) -> "TypeAdapter[_C]":
     """What checks a configuration; to make it takes 10 ms, as long as to look at a finished log."""
+    from pydantic import TypeAdapter  # noqa: PLC0415 - see `stage_config`
+
     return TypeAdapter(config)
 
 

@@ -74,16 +74,20 @@ class SelectionOptions:
         Raises:
             UsageError: an option cannot be read.
         """
-        from mcap_landmarks.inspection.topic_roles import parse_remaps
         from mcap_landmarks.runs.topic_selection import Selection
 
+        remap = {}
+        if self.remap:
+            from mcap_landmarks.inspection.topic_roles import parse_remaps
+
+            remap = parse_remaps(self.remap)
         return Selection(
             tuple(self.topics or ()),
             time_ns(self.start, "--start"),
             time_ns(self.end, "--end"),
             tuple(self.exclude or ()),
             tuple(self.types or ()),
-            tuple(parse_remaps(self.remap or []).items()),
+            tuple(remap.items()),
         )
 
 

@@ -3,7 +3,6 @@
 import importlib
 import os
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +10,7 @@ import typer
 
 from mcap_landmarks import memory
 from mcap_landmarks.cli.console import heeding_signals, progress, run_command, warn
+from mcap_landmarks.cli.given_values import pass_on
 from mcap_landmarks.cli.option_groups import spread
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.remote.shown_copies import copies_shown
@@ -19,6 +19,7 @@ _NOT_VERBS = {
     "__init__",
     "main",
     "console",
+    "given_values",
     "option_groups",
     "options",
     "scenarios",
@@ -128,7 +129,7 @@ def run(arguments: list[str] | None = None) -> None:
     given = sys.argv[1:] if arguments is None else arguments
     asked = _asked(given)
     named = f"{asked} " if asked in verbs() else ""
-    application: Callable[..., object] = build(asked, has_help=not named or given[:1] != [asked])
+    application = pass_on(typer.main.get_command(build(asked, has_help=not named or given[:1] != [asked])))
     with heeding_signals(), copies_shown(progress, warn):
         code = run_command(application, given, f"see mcap-landmarks {named}--help")
     sys.exit(code)

@@ -14,7 +14,6 @@ from mcap_landmarks.recording.checksum import crc32
 from mcap_landmarks.recording.container import CHUNK, LARGEST_CHUNK, RECORD, Opcode
 from mcap_landmarks.recording.summary_index import Block
 
-
 _OF_THREAD = threading.local()
 
 

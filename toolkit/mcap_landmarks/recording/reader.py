@@ -187,7 +187,10 @@ class Recording:
         """
         within, key = (start_ns or 0, 2**64 if end_ns is None else end_ns), self._ids[connection]
         empty = empty_table(layout, fields)
-        wanted, found = Wanted(key, layout, empty.columns, within, []), GatheredBlocks(empty, self.index.counts.get(key, 0))
+        wanted, found = (
+            Wanted(key, layout, empty.columns, within, []),
+            GatheredBlocks(empty, self.index.counts.get(key, 0)),
+        )
         with reading(self._stream, self._blocks({key: connection}, *within), self.index.blocks) as blocks:
             for block in blocks:
                 rows = self._take(block, partial(rows_in, self._stream, block, wanted), progress)

@@ -17,7 +17,6 @@ from mcap_landmarks.runs.input_hashes import HashOf, input_hashes
 from mcap_landmarks.runs.output_formats import OutputForm, OutputFormat, planned
 from mcap_landmarks.runs.outputs import no_empty_folder
 from mcap_landmarks.runs.replacing import IsEarlier, Replacing, check_apart, earlier_recording, new_files, output_to
-from mcap_landmarks.runs.ros1_bag import write_ros1_bag
 from mcap_landmarks.runs.rosbag2_output import write_bag
 from mcap_landmarks.runs.split_outputs import write_parts
 from mcap_landmarks.runs.topic_selection import Selection
@@ -98,6 +97,8 @@ def _written(job: Job, target: Location, form: OutputForm, replacing: Replacing,
     if form.to is OutputFormat.ROSBAG2:
         return [write_bag(job, target, form.split, replacing, advance)]
     if form.to is OutputFormat.BAG:
+        from mcap_landmarks.runs.ros1_bag import write_ros1_bag  # noqa: PLC0415 - few conversions write bags
+
         with new_files([target], (), overwrite=replacing.overwrite):
             return [write_ros1_bag(job, target, form.chunks, advance)]
     if form.split:

@@ -11,7 +11,6 @@ from mcap_landmarks.atomic import check_target, held
 from mcap_landmarks.errors import RecordingError, ToolkitError, UsageError
 from mcap_landmarks.locations import Location, Url, address, check_there, files_in, is_there
 from mcap_landmarks.manifest import CONTENT, RUN, entry_text, file_hash
-from mcap_landmarks.maps.database import read_manifest
 from mcap_landmarks.recording.reader import open_recording
 
 IsEarlier = Callable[[Location], bool]
@@ -133,6 +132,8 @@ def generated_recording(entries: Mapping[str, str]) -> IsEarlier:
 
 def earlier_map(verb: str, inputs: Sequence[str]) -> IsEarlier:
     """Landmark databases that a verb made of recordings with these fingerprints, with whatever settings."""
+    from mcap_landmarks.maps.database import read_manifest  # noqa: PLC0415 - few verbs make maps, all use this file
+
     made = _made_by(verb, inputs)
     return lambda path: _agree(read_manifest(path), made)
 
