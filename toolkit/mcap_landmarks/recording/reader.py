@@ -187,10 +187,8 @@ class Recording:
         """
         within, key = (start_ns or 0, 2**64 if end_ns is None else end_ns), self._ids[connection]
         empty = empty_table(layout, fields)
-        wanted, found = (
-            Wanted(key, layout, empty.columns, within, []),
-            GatheredBlocks(empty, self.index.counts.get(key, 0)),
-        )
+        found = GatheredBlocks(empty, self.index.counts.get(key, 0))
+        wanted = Wanted(key, layout, empty.columns, within, [])
         with reading(self._stream, self._blocks({key: connection}, *within), self.index.blocks) as blocks:
             for block in blocks:
                 rows = self._take(block, partial(rows_in, self._stream, block, wanted), progress)
@@ -258,13 +256,8 @@ class Recording:
 
     def _blocks(self, wanted: dict[int, Connection], first_ns: int, last_ns: int) -> list[Block]:
         """The blocks that may hold wanted messages of those times, by their start."""
-        blocks = [
-            block
-            for block in self.index.blocks
-            if block.end_ns >= first_ns
-            and block.start_ns < last_ns
-            and (block.channel_ids is None or not block.channel_ids.isdisjoint(wanted))
-        ]
+        within = (block for block in self.index.blocks if block.end_ns >= first_ns and block.start_ns < last_ns)
+        blocks = (block for block in within if not (block.channel_ids and block.channel_ids.isdisjoint(wanted)))
         return sorted(blocks, key=lambda block: (block.start_ns, block.offset))
 
     def _load(
