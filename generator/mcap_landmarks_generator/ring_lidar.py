@@ -1,6 +1,6 @@
 """A LiDAR of several rings: beams cast while it turns and the robot drives on, and what they return."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from mcap_landmarks.stage import Channel, Stamped
@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 
 from mcap_landmarks_generator.clock import Delivery, measurement_times, to_ns
 from mcap_landmarks_generator.history import History, rotate
+from mcap_landmarks_generator.layout import PlacedObject
 from mcap_landmarks_generator.randomness import Stream, draws
+from mcap_landmarks_generator.ring_caster import RingCaster
 from mcap_landmarks_generator.ring_cloud import RingCloud
 from mcap_landmarks_generator.sensor_specs import RingLidarSpec
-from mcap_landmarks_generator.world import Returns, World
+from mcap_landmarks_generator.world import Returns
 
 Floats = NDArray[np.float64]
 
@@ -41,8 +43,9 @@ _RAIN_M = 4.0
 class RingLidar:
     """Clouds of one simulated recording, in order."""
 
-    def __init__(self, spec: RingLidarSpec, seed: int, start_ns: int) -> None:
+    def __init__(self, spec: RingLidarSpec, objects: Sequence[PlacedObject], seed: int, start_ns: int) -> None:
         self._spec, self._seed = spec, seed
+        self._caster = RingCaster(objects)
         self._delivery = Delivery(spec, seed, Stream.RINGS_DELIVERY, start_ns)
         self._times = measurement_times(spec, draws(seed, Stream.RINGS_CLOCK))
         self._next_ns = next(self._times)
@@ -50,20 +53,20 @@ class RingLidar:
         self._period_ns = to_ns(1 / spec.rate_hz)
         self._directions = directions(spec)
 
-    def measure(self, history: History, world: World) -> Iterator[Stamped]:
+    def measure(self, history: History) -> Iterator[Stamped]:
         """The clouds whose last beam lies in the past."""
         while self._next_ns + self._period_ns <= history.end_ns:
             delivered = self._delivery.of(self._next_ns, self._period_ns)
             if delivered is not None:
-                cloud = self._cloud(history, world, self._next_ns, delivered.stamp_ns)
+                cloud = self._cloud(history, self._next_ns, delivered.stamp_ns)
                 yield Stamped(POINTS, delivered.log_time_ns, cloud)
             self._index += 1
             self._next_ns = next(self._times)
 
-    def _cloud(self, history: History, world: World, first_ns: int, stamp_ns: int) -> RingCloud:
+    def _cloud(self, history: History, first_ns: int, stamp_ns: int) -> RingCloud:
         spec, rng = self._spec, draws(self._seed, Stream.RINGS, self._index)
         after_ns = np.arange(spec.beams, dtype=np.int64) * self._period_ns // spec.beams
-        returns = cast_rings(world, history, spec, self._directions, first_ns + after_ns)
+        returns = cast_rings(self._caster, history, spec, self._directions, first_ns + after_ns)
         ranges = _measured(returns.distances_m.reshape(spec.beams, spec.rings), spec, rng)
         intensities = intensities_of(returns).reshape(ranges.shape)
         there = np.isfinite(ranges)
@@ -90,17 +93,15 @@ def directions(spec: RingLidarSpec) -> Floats:
 
 
 def cast_rings(
-    world: World, history: History, spec: RingLidarSpec, unit: Floats, times_ns: NDArray[np.int64]
+    caster: RingCaster, history: History, spec: RingLidarSpec, unit: Floats, times_ns: NDArray[np.int64]
 ) -> Returns:
     """What the beams (beams, rings) meet first, each at its beam's time (beams,), as one row after the other."""
-    orientations = np.repeat(history.orientations(times_ns), spec.rings, axis=0)
+    orientations = history.orientations(times_ns)
     mount = np.broadcast_to([0.0, 0.0, spec.height_m], (len(times_ns), 3))
-    starts = history.positions(times_ns) + rotate(history.orientations(times_ns), mount)
-    starts = np.repeat(starts, spec.rings, axis=0)
+    starts = history.positions(times_ns) + rotate(orientations, mount)
+    rays = rotate(np.repeat(orientations, spec.rings, axis=0), unit.reshape(-1, 3)).reshape(unit.shape)
     reach_m = spec.range_max_m + 4 * spec.sigma_m
-    rays = rotate(orientations, unit.reshape(-1, 3))
-    world.move_walkers(float(times_ns.mean()) / 1e9)
-    return world.returns(starts, rays, reach_m, spec.glass_deg)
+    return caster.returns(starts, rays, reach_m, spec.glass_deg, float(times_ns.mean()) / 1e9)
 
 
 def _measured(distances: Floats, spec: RingLidarSpec, rng: np.random.Generator) -> Floats:

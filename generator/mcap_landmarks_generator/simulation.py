@@ -51,7 +51,7 @@ class Simulation:
         self._cameras = [Camera(mount, i, scenario.start_ns) for i, mount in enumerate(mounts(scenario))]
         self._lidar = Lidar(scenario.lidar, scenario.seed, scenario.start_ns)
         rings = scenario.ring_lidar
-        self._rings = RingLidar(rings, scenario.seed, scenario.start_ns) if rings is not None else None
+        self._rings = RingLidar(rings, staged.objects, scenario.seed, scenario.start_ns) if rings is not None else None
         imu = scenario.imu
         self._imu = ImuSensor(imu, scenario.seed, scenario.start_ns) if imu is not None else None
         self._odometry = OdometrySensor(scenario.odometry, scenario.seed, scenario.start_ns)
@@ -114,7 +114,7 @@ class Simulation:
             yield from self._imu.measure(self._history)
         yield from self._lidar.measure(self._history, world)
         if self._rings is not None:
-            yield from self._rings.measure(self._history, world)
+            yield from self._rings.measure(self._history)
         for camera in self._cameras:
             yield from camera.measure(self._history)
 
