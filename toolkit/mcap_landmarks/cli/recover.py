@@ -55,5 +55,9 @@ def _print(done: "Recovered") -> None:
         say(f"suspect chunk at byte {chunk.offset}: {held}, {chunk.reason}")
     for stretch in damage.resyncs:
         say(f"passed over: byte {stretch.start} to byte {stretch.end}, {stretch.reason}")
+    if done.lost:
+        from mcap_landmarks.runs.loss_report import told_causes
+
+        say(f"messages lost: {told_causes(done.lost)}")
     if not done.losses:
         say("nothing is lost")

@@ -15,16 +15,17 @@ from mcap_landmarks.manifest import CARRIED, RUN, Manifest, entry_text, file_has
 from mcap_landmarks.progress import Progress
 from mcap_landmarks.recording.chunk_copy import WholeChunk
 from mcap_landmarks.recording.chunk_form import ChunkForm
+from mcap_landmarks.recording.damage import Damage
 from mcap_landmarks.recording.latched import carried_note
 from mcap_landmarks.recording.summary_index import MetadataRecord
 from mcap_landmarks.recording.writer import ROS2, RecordingWriter, create_recording, profile_of
 from mcap_landmarks.runs.bag_record import Told, bag_of, bag_record, custom_data_of
 from mcap_landmarks.runs.conversion_inputs import ConversionInputs
 from mcap_landmarks.runs.input_hashes import HashOf
-from mcap_landmarks.runs.loss_report import REPORT, loss_report
+from mcap_landmarks.runs.loss_report import REPORT, account_of, damage_of, loss_report, lost_by_cause, report_of
 from mcap_landmarks.runs.output_formats import OutputFormat
 from mcap_landmarks.runs.rosbag2_metadata import RECORD, BagFile, BagMetadata, record_of
-from mcap_landmarks.sources import OmittedTopic, definition_files
+from mcap_landmarks.sources import LossAccount, OmittedTopic, definition_files
 from mcap_landmarks.stage import Connection, RawMessage
 
 _LOST_WITH = frozenset({RUN, RECORD})  # metadata records that would no longer be true
@@ -46,6 +47,19 @@ class Converted:
     losses: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     left_out: list[OmittedTopic] = field(default_factory=list)
+    account: LossAccount = field(default_factory=LossAccount)
+
+    def damage(self) -> Damage:
+        """The account in the terms of a recording's; what is damaged may not say how many messages it should hold."""
+        losses = self.told_losses()
+        expected = None if losses and not self.lost else self.declared + self.account.undeclared
+        return damage_of(self.account, expected, self.topics.total(), losses)
+
+    def lost_by_cause(self) -> dict[str, int | None]:
+        """How many messages are lost for each cause, None where nothing tells."""
+        left_out = sum(one.messages for one in self.left_out)
+        omitted = {"not_understood": left_out} if left_out else {}
+        return lost_by_cause(self.damage(), {**self.account.messages, **omitted})
 
     def told_losses(self) -> list[str]:
         """All that is lost, in words."""
@@ -116,7 +130,7 @@ class Job:
             if is_last:
                 self.account(done)
             if lost := done.told_losses():
-                writer.metadata[REPORT] = loss_report(done.declared, done.topics.total(), lost)
+                writer.metadata[REPORT] = loss_report(report_of(done.damage(), done.lost_by_cause(), lost, done.notes))
         return done
 
     def tally(self, done: Converted, counts: Mapping[Connection, int], carried: Sequence[RawMessage]) -> None:
@@ -172,6 +186,7 @@ class Job:
             done.dropped.update(log.dropped)
             done.notes += log.notes
         done.notes += [note for part in self.inputs.parts for note in notes_of(part)]
+        done.account = account_of(self.inputs.parts)
         done.losses, done.left_out = self.inputs.losses, self.inputs.left_out
         if self.inputs.selection.is_cut:
             if missing:

@@ -17,7 +17,7 @@ from mcap_landmarks.recording.opening import begins_or_ends
 from mcap_landmarks.recording.reader import Recording, open_recording, reading_from_front
 from mcap_landmarks.recording.writer import RecordingWriter, create_recording
 from mcap_landmarks.runs.convert import convert
-from mcap_landmarks.runs.loss_report import REPORT, loss_report
+from mcap_landmarks.runs.loss_report import REPORT, loss_report, lost_by_cause, report_of
 from mcap_landmarks.runs.outputs import output_files
 from mcap_landmarks.runs.replacing import check_apart, earlier_recording, output_to
 from mcap_landmarks.runs.topic_selection import Selection
@@ -29,11 +29,15 @@ _NO_CRC = "the format has no CRC: nothing verifies the messages beyond the defin
 
 @dataclass(frozen=True, slots=True)
 class Recovered:
-    """The output, its messages by topic, attachments and metadata records that were saved, and the account."""
+    """The output, its messages by topic, attachments and metadata records that were saved, and the account.
+
+    `lost` are messages by cause, None where nothing tells how many.
+    """
 
     path: Location
     topics: Mapping[str, int]
     damage: Damage
+    lost: Mapping[str, int | None]
     attachments: int
     metadata: int
     losses: tuple[str, ...]
@@ -90,8 +94,9 @@ def _recover_mcap(path: Path, target: Location, watch: Watch, *, overwrite: bool
             if not topics.total():
                 raise RecordingError(f"{path}: {_why_nothing(losses)}")
             damage = dataclasses.replace(recording.damage, recovered=topics.total())
-            done = Recovered(target, topics, damage, attachments, len(recording.metadata_records), losses, notes)
-            writer.metadata[REPORT] = loss_report(damage.expected, damage.recovered, losses, report(done))
+            lost, records = lost_by_cause(damage, {}), len(recording.metadata_records)
+            done = Recovered(target, topics, damage, lost, attachments, records, losses, notes)
+            writer.metadata[REPORT] = loss_report(report(done))
     return done
 
 
@@ -121,23 +126,11 @@ def _recover_bag(path: Path, target: Location, watch: Watch, settings: Settings,
     with reading_from_front():
         conversion = convert([path], target, Selection(), settings, watch, overwrite=overwrite, verb="recover")
     (done,) = conversion.outputs
-    losses = done.told_losses()
-    expected = None if losses and not done.lost else done.declared  # what is damaged may not count itself
-    damage = Damage(expected=expected, recovered=done.topics.total(), records=tuple(losses))
     notes = (*done.notes, *([_NO_CRC] if path.suffix in {".bag", ".db3"} else []))
-    return Recovered(done.path, done.topics, damage, 0, 0, tuple(losses), notes)
+    losses = tuple(done.told_losses())
+    return Recovered(done.path, done.topics, done.damage(), done.lost_by_cause(), 0, 0, losses, notes)
 
 
 def report(done: Recovered) -> dict[str, object]:
     """The account as JSON values, as it stands in the output's metadata and in the document."""
-    damage = done.damage
-    return {
-        "expected": damage.expected,
-        "recovered": damage.recovered,
-        "suspect_chunks": [dataclasses.asdict(chunk) for chunk in damage.suspect_chunks],
-        "resyncs": [{"from": stretch.start, "to": stretch.end, "reason": stretch.reason} for stretch in damage.resyncs],
-        "unverified_chunks": damage.unverified,
-        "duplicate_chunks": list(damage.duplicates),
-        "losses": list(done.losses),
-        "notes": list(done.notes),
-    }
+    return report_of(done.damage, done.lost, done.losses, done.notes)

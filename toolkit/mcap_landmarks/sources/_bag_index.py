@@ -8,11 +8,12 @@ from typing import BinaryIO
 from mcap_landmarks.sources import _bag_container as container
 from mcap_landmarks.sources._bag_container import BagConnection, BagMessage, ChunkInfo, DamagedBagError
 from mcap_landmarks.sources._bag_resync import next_record
+from mcap_landmarks.sources._loss_account import LossAccount, LostStretch
 
 
 @dataclass(slots=True)
 class BagIndex:
-    """Connections by id, chunks by time, and in words what is known to be lost.
+    """Connections by id, chunks by time, and what is known to be lost: in words, and in the `account`.
 
     `damaged_at` is where the last chunk begins that was scanned, if that is damaged.
     """
@@ -20,6 +21,7 @@ class BagIndex:
     connections: dict[int, BagConnection] = field(default_factory=dict)
     chunks: list[ChunkInfo] = field(default_factory=list)
     losses: list[str] = field(default_factory=list)
+    account: LossAccount = field(default_factory=LossAccount)
     damaged_at: int | None = None
 
     def counts(self) -> Counter[int]:
@@ -107,13 +109,16 @@ def _by_scanning(stream: BinaryIO, size: int, offset: int) -> BagIndex:
             found = next_record(stream, size, search + 1)
             if found is None:
                 index.losses.append(f"at byte {offset} of {size}: {error}; what follows is lost")
+                index.account.add("cut", None)
                 return index
             begin = min(offset, found)
             index.losses.append(f"{found - begin} bytes passed over from byte {begin} to byte {found} ({error})")
+            index.account.passed_over.append(LostStretch(begin, found, str(error)))
             index.damaged_at = None
             offset = found
     if offset > size:
         index.losses.append(f"the file is cut at byte {size}, within a chunk; what follows is lost")
+        index.account.add("cut", None)
     return index
 
 

@@ -26,6 +26,7 @@ from mcap_landmarks.sources._db3_topics import (
     topic_of,
 )
 from mcap_landmarks.sources._definitions import Definitions
+from mcap_landmarks.sources._loss_account import LossAccount
 from mcap_landmarks.sources._shape import Definition, OmittedTopic, Payload
 from mcap_landmarks.sources._verification import defined, settled
 from mcap_landmarks.stage import ChannelSummary, Connection, RawMessage
@@ -87,6 +88,7 @@ class Db3Log:
         """`origin` is the file that errors name, where `path` is a temporary one."""
         self.losses: list[str] = []
         self.left_out: list[OmittedTopic] = []
+        self.account = LossAccount()
         self._path, self._origin = path, origin or path
         self._unpacked = unpacker()
         try:
@@ -114,6 +116,7 @@ class Db3Log:
                 self._leave_out(key, row["name"], row["type"], str(error))
         orphans = sum(count for key, count in self._counts.items() if key not in rows)
         if orphans:
+            self.account.add("without_topic", orphans, is_declared=False)
             self._lose(f"{counted(orphans, 'message')} of topics that are nowhere described left out")
 
     @property
@@ -165,11 +168,13 @@ class Db3Log:
                 counts[topic] += 1
                 times.append(time_ns)
             if gaps:
+                self.account.add("unreadable_rows", sum(gaps), is_declared=False)
                 self._lose(f"{counted(sum(gaps), 'row')} between readable ones cannot be read")
             self.start_ns, self.end_ns = min(times, default=None), max(times, default=None)
         return counts
 
     def _damaged(self, error: sqlite3.DatabaseError) -> None:
+        self.account.add("unreadable_rows", None)
         self._lose(f"it is cut or damaged ({error}); the rows that can be read before and behind the damage were taken")
 
     def _lose(self, text: str) -> None:
@@ -193,6 +198,7 @@ class Db3Log:
         get, new, magic = wanted.get, tuple.__new__, ZSTD_MAGIC
         for time_ns, _, key, data in self._ordered(first, end):
             if type(data) is not bytes or type(time_ns) is not int or time_ns < 0:
+                self.account.add("unsound_rows")
                 self._lose("rows without a sound time and payload are left out")
                 continue
             read += len(data)
@@ -214,6 +220,7 @@ class Db3Log:
         try:
             return self._unpacked(data)
         except MessageError as error:
+            self.account.add("not_decompressed")
             self._lose(f"{connection.topic}: {error}; such messages are left out")
             return None
 

@@ -64,7 +64,7 @@ class BagLog:
     """The log in a bag. Connections that differ only in their publisher share one channel."""
 
     def __init__(self, path: Path, size: int, index: BagIndex, files: DefinitionFiles) -> None:
-        self.losses = [f"{path.name}: {loss}" for loss in index.losses]
+        self.losses, self.account = [f"{path.name}: {loss}" for loss in index.losses], index.account
         self._path, self._size, self._chunks = path, size, [chunk for chunk in index.chunks if chunk.counts]
         self._known = frozenset(index.connections)
         self._files = files
@@ -151,14 +151,16 @@ class BagLog:
                 progress(stream.tell() - chunk.offset)
         missing = sum(chunk.counts.values()) - len(found)
         where = f"the chunk at byte {chunk.offset}"
+        if missing > 0 or problem:
+            self.account.chunks[chunk.offset] = missing if missing > 0 else None, problem or "messages are missing"
         if missing > 0:
             why = f" ({problem})" if problem else ""
             self._lose(f"{where}{why} lacks {missing} of {counted(sum(chunk.counts.values()), 'message')}")
         elif problem:
             self._lose(f"{where} is damaged ({problem}); {counted(len(found), 'message')} before that taken")
         orphans = sum(message.connection_id not in self._known for message in found)
-        if orphans:
-            self._lose(f"{counted(orphans, 'message')} of {where} without a connection left out")
+        if orphans and self._lose(f"{counted(orphans, 'message')} of {where} without a connection left out"):
+            self.account.add("without_topic", orphans, is_declared=False)
         return found
 
     def _carry(self, described: BagConnection, count: int) -> tuple[Connection, Convert] | None:
@@ -176,14 +178,17 @@ class BagLog:
             self._unsure[connection] = [Definition(text, type_.check)]
         return connection, type_.convert
 
-    def _lose(self, text: str) -> None:
+    def _lose(self, text: str) -> bool:
+        """Tell a loss; whether it was not told before."""
         text = f"{self._path.name}: {text}"
-        if text not in self.losses:
-            self.losses.append(text)
+        is_new = text not in self.losses
+        self.losses += [text] if is_new else []
+        return is_new
 
     def _misfit(self, connection: Connection, error: MessageError) -> None:
         """Tell of the first message of a topic that does not fit; the counts tell of the others."""
         self._misfits[connection] += 1
+        self.account.add("not_fitting")
         if self._misfits[connection] == 1:
             self._lose(f"{connection.topic}: {error}; such messages are left out")
 
