@@ -17,7 +17,7 @@ from mcap_landmarks.cli.batch_tasks import tasks_of
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.fleet.cuts import over_memory
 from mcap_landmarks.fleet.recorded_time import recorded_s
-from mcap_landmarks.fleet.tasks import Ended, Started, Task, TaskLimits
+from mcap_landmarks.fleet.tasks import Ended, Started, Task, TaskLimits, Waits
 from mcap_landmarks.recording.reader import open_recording
 
 from tests.cli.calls import call, schema_of
@@ -258,6 +258,9 @@ def test_the_table_shows_what_runs_and_what_ended(
     table.started(TASK, 1)
     clock[0] = 90.0
     assert table.rows() == [("a.mcap", "runs", "1:30"), ("localize: 0 of 3 logs, none ended", "", "")]
+    table.waits(TASK)
+    clock[0] = 92.0
+    assert table.rows()[0] == ("a.mcap", "waits to run again", "0:02")
     table.started(TASK, 2)
     assert table.rows()[0] == ("a.mcap", "runs again", "0:00")
     clock[0] = 120.0
@@ -296,7 +299,7 @@ def test_the_pace_is_told_by_how_long_recordings_last(tmp_path: Path, capsys: py
 class Stopped:
     """Workers of which one ends and the next hears Ctrl-C."""
 
-    def run(self, tasks: Sequence[Task], _limits: TaskLimits, _started: Started) -> Iterator[Ended]:
+    def run(self, tasks: Sequence[Task], _limits: TaskLimits, _started: Started, _waits: Waits) -> Iterator[Ended]:
         """See `fleet.tasks.Workers`."""
         yield Ended(tasks[0], 0, "", "", 1.0, None, 1)
         raise KeyboardInterrupt

@@ -9,7 +9,7 @@ import jsonschema
 import numpy as np
 import pytest
 from mcap_landmarks.channels import CAMERA_IMAGE, DETECTIONS, TRUTH_DETECTIONS
-from mcap_landmarks.cli.console import DONE
+from mcap_landmarks.cli.console import DONE, INTERRUPTED
 from mcap_landmarks.messages.codec import decode
 from mcap_landmarks.messages.detections import Detections
 from mcap_landmarks.recording.reader import open_recording
@@ -26,6 +26,7 @@ def dataset(log: Path, folder: Path, *more: object) -> dict[str, Any]:
     out = folder / "boxes.json"
     assert call("export", log, "--format", "coco", "-o", out, "--overwrite", *more) == DONE
     found: dict[str, Any] = json.loads(out.read_text())
+    assert found.pop("info").keys() == {"description"}
     assert found.keys() == {"images", "annotations", "categories"}
     numbers = {name: [entry["id"] for entry in entries] for name, entries in found.items()}
     assert all(len(set(ids)) == len(ids) and 0 not in ids for ids in numbers.values())
@@ -115,3 +116,33 @@ def test_trouble_is_told(whole_result: Path, tmp_path: Path, capsys: pytest.Capt
     assert "has neither detections nor the truth" in refused(capsys, 1, "export", log, *words)
     assert "/scan has no boxes in images" in refused(capsys, 2, "export", whole_result, *words, "--topic", "/scan")
     assert not out.exists()
+
+
+def test_its_own_earlier_result_is_written_again_and_nothing_else(
+    whole_result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, images = tmp_path / "boxes.json", tmp_path / "images"
+    words = "export", whole_result, "--format", "coco", "-o", out, "--images", images
+    for _ in range(2):
+        assert call(*words) == DONE
+    (images / "notes.txt").write_text("mine")
+    assert "--overwrite" in refused(capsys, 2, *words)
+    (images / "notes.txt").unlink()
+    out.write_text("{}")
+    assert "--overwrite" in refused(capsys, 2, *words)
+    assert "beside that folder" in refused(capsys, 2, *words[:-3], images / "boxes.json", "--images", images)
+
+
+def test_who_stops_it_has_neither_images_nor_boxes(
+    whole_result: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mcap_landmarks.report.coco_dataset._annotations", stopped)  # when all images are there
+    folder = tmp_path / "out"
+    folder.mkdir()
+    words = "export", whole_result, "--format", "coco", "-o", folder / "boxes.json", "--images", folder / "images"
+    assert call(*words) == INTERRUPTED
+    assert list(folder.iterdir()) == []
+    assert len(capsys.readouterr().err.splitlines()) == 1

@@ -92,3 +92,14 @@ def test_trouble_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
     log.write_bytes(log.read_bytes()[:-200])
     assert call(*words, out) == PARTIAL
     assert rows(out)
+
+
+def test_its_own_earlier_result_is_written_again_and_no_other_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, out = localized_log(tmp_path / "r.mcap"), tmp_path / "r.rrd"
+    words = "export", log, "--format", "rerun", "-o", out
+    assert call(*words) == DONE
+    assert call(*words) == DONE
+    out.write_bytes(b"RRF2 of another log")
+    assert "--overwrite" in refused(capsys, 2, *words)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from mcap_landmarks.cli.main import run
 from mcap_landmarks.fleet.local_workers import LocalWorkers
-from mcap_landmarks.fleet.tasks import Ended, Started, Task, TaskLimits
+from mcap_landmarks.fleet.tasks import Ended, Started, Task, TaskLimits, Waits
 
 
 def run_or_hang(words: list[str]) -> None:
@@ -20,11 +20,11 @@ def run_or_hang(words: list[str]) -> None:
 class HangingWorkers:
     """Two processes for what does not hang, then for what does."""
 
-    def run(self, tasks: Sequence[Task], limits: TaskLimits, started: Started) -> Iterator[Ended]:
+    def run(self, tasks: Sequence[Task], limits: TaskLimits, started: Started, waits: Waits) -> Iterator[Ended]:
         """See `fleet.tasks.Workers`."""
         workers = LocalWorkers(2, run_or_hang)
-        yield from workers.run([task for task in tasks if not _hangs(task.words)], TaskLimits(), started)
-        yield from workers.run([task for task in tasks if _hangs(task.words)], limits, started)
+        yield from workers.run([task for task in tasks if not _hangs(task.words)], TaskLimits(), started, waits)
+        yield from workers.run([task for task in tasks if _hangs(task.words)], limits, started, waits)
 
 
 def _hangs(words: Sequence[str]) -> bool:

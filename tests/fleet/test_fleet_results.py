@@ -38,7 +38,7 @@ def localizing(folder: Path, name: str, into: str, *options: str) -> Task:
 def finished(
     tasks: Sequence[Task], workers: int = 1, started: Callable[[Task, int], None] = lambda _task, _pid: None
 ) -> list[Ended]:
-    ended = list(LocalWorkers(workers, run).run(tasks, TaskLimits(), started))
+    ended = list(LocalWorkers(workers, run).run(tasks, TaskLimits(), started, lambda _task: None))
     assert [one.stderr for one in ended if one.exit_code] == []
     return ended
 

@@ -24,13 +24,18 @@ def task(action: str, path: Path) -> Task:
 
 def run(tasks: Sequence[Task], workers: int = 1, limits: TaskLimits = TaskLimits()) -> dict[str, Ended]:  # noqa: B008
     """The ends by verb."""
-    return {one.task.verb: one for one in LocalWorkers(workers, toy).run(tasks, limits, lambda _task, _pid: None)}
+    return {
+        one.task.verb: one
+        for one in LocalWorkers(workers, toy).run(tasks, limits, lambda _task, _pid: None, lambda _task: None)
+    }
 
 
 def test_a_worker_lives_on_and_uses_one_thread(tmp_path: Path) -> None:
     told: list[tuple[Task, int]] = []
     tasks = [task("tiny", tmp_path / str(i)) for i in range(4)]
-    ended = list(LocalWorkers(1, toy).run(tasks, TaskLimits(), lambda one, pid: told.append((one, pid))))
+    ended = list(
+        LocalWorkers(1, toy).run(tasks, TaskLimits(), lambda one, pid: told.append((one, pid)), lambda _task: None)
+    )
     assert [one.task for one in ended] == [one for one, _ in told] == tasks
     assert {one.stdout for one in ended} == {f"{told[0][1]} 1\n"}
     assert all(one.exit_code == 0 and one.peak_bytes for one in ended)
@@ -39,7 +44,11 @@ def test_a_worker_lives_on_and_uses_one_thread(tmp_path: Path) -> None:
 def test_what_is_killed_gets_one_retry_and_stops_no_other(tmp_path: Path) -> None:
     """Also one that fails by itself: it would again, and gets none."""
     names = ("die", "die_once", "fail", "tiny")
-    ended = run([task(name, tmp_path / name) for name in names], workers=2)
+    waited: list[str] = []
+    tasks, workers = [task(name, tmp_path / name) for name in names], LocalWorkers(2, toy)
+    ends = workers.run(tasks, TaskLimits(), lambda _task, _pid: None, lambda one: waited.append(one.verb))
+    ended = {one.task.verb: one for one in ends}
+    assert sorted(waited) == ["die", "die_once"]
     assert {name: (one.exit_code, one.attempts, one.cut) for name, one in ended.items()} == {
         "die": (-9, 2, "killed"),
         "die_once": (0, 2, None),
@@ -65,7 +74,9 @@ def test_limits_end_a_task_and_say_so(tmp_path: Path) -> None:
 def test_an_idle_worker_that_is_killed_is_replaced(tmp_path: Path) -> None:
     pids: list[int] = []
     tasks = [task("tiny", tmp_path / str(i)) for i in range(3)]
-    for count, _ in enumerate(LocalWorkers(1, toy).run(tasks, TaskLimits(), lambda _task, pid: pids.append(pid))):
+    for count, _ in enumerate(
+        LocalWorkers(1, toy).run(tasks, TaskLimits(), lambda _task, pid: pids.append(pid), lambda _task: None)
+    ):
         if count == 0:
             os.kill(pids[0], signal.SIGKILL)
             time.sleep(0.3)
@@ -76,7 +87,7 @@ def test_breaking_off_lets_the_running_ones_clean_up(tmp_path: Path) -> None:
     """As Ctrl-C and SIGTERM do: the iteration is closed by what they raise."""
     pids: list[int] = []
     tasks = [task("hang", tmp_path / "x"), task("tiny", tmp_path / "y"), task("hang", tmp_path / "z")]
-    ends = LocalWorkers(2, toy).run(tasks, TaskLimits(), lambda _task, pid: pids.append(pid))
+    ends = LocalWorkers(2, toy).run(tasks, TaskLimits(), lambda _task, pid: pids.append(pid), lambda _task: None)
     assert next(ends).task.verb == "tiny"
     while not (tmp_path / "x.partial").exists():
         time.sleep(0.01)

@@ -62,7 +62,10 @@ def run(
     command: CommandLine = toy,
 ) -> dict[str, Ended]:
     """The ends by output."""
-    return {Path(str(one.task.output)).name: one for one in workers(address, command).run(tasks, limits, started)}
+    return {
+        Path(str(one.task.output)).name: one
+        for one in workers(address, command).run(tasks, limits, started, lambda _task: None)
+    }
 
 
 def test_what_is_killed_hangs_or_grows_gets_one_retry_and_stops_no_other(address: str, tmp_path: Path) -> None:
@@ -113,7 +116,7 @@ def test_logs_of_killed_workers_are_done_with_the_same_bytes(address: str, tmp_p
 def test_breaking_off_leaves_no_actor_and_nothing_half_written(address: str, tmp_path: Path) -> None:
     pids: list[int] = []
     tasks = [task("spin", tmp_path / "x"), task("tiny", tmp_path / "y"), task("spin", tmp_path / "z")]
-    ends = workers(address).run(tasks, NO_LIMITS, lambda _task, pid: pids.append(pid))
+    ends = workers(address).run(tasks, NO_LIMITS, lambda _task, pid: pids.append(pid), lambda _task: None)
     assert next(ends).task.verb == "tiny"
     while not (tmp_path / "x.partial").exists():
         time.sleep(0.01)
@@ -129,7 +132,7 @@ def test_another_version_on_the_nodes_is_said(address: str, tmp_path: Path, monk
     said: list[str] = []
     crew = RayWorkers(toy, address, 1, say=said.append)
     with pytest.raises(ToolkitError, match=r"no worker is left: node .* runs another mcap-landmarks .*; install the"):
-        list(crew.run([task("tiny", tmp_path / "x")], NO_LIMITS, lambda _task, _pid: None))
+        list(crew.run([task("tiny", tmp_path / "x")], NO_LIMITS, lambda _task, _pid: None, lambda _task: None))
     assert len(said) == 1
 
 
@@ -153,7 +156,7 @@ def test_what_a_cluster_has_no_room_for_is_not_waited_for_without_end(
     with pytest.raises(
         ToolkitError, match="no worker in 0 minutes: 1 worker of one CPU and one GPU each were asked for"
     ):
-        list(crew.run([task("tiny", tmp_path / "x")], NO_LIMITS, lambda _task, _pid: None))
+        list(crew.run([task("tiny", tmp_path / "x")], NO_LIMITS, lambda _task, _pid: None, lambda _task: None))
     assert said == [
         "note: waiting for 1 worker of one CPU and one GPU each; the cluster has 2 of 2 CPUs free, 0 of 0 GPUs free"
     ]

@@ -88,6 +88,10 @@ PLANTED: dict[str, tuple[Change, set[tuple[str, str, str]]]] = {
         of(CAMERA_IMAGE, lambda s: every(s, 2 * SECOND)),
         {("rate", "/camera/image_raw/compressed", "0.5 Hz is slow"), ("partners", "/scan", "28 % of its messages")},
     ),
+    "images at nearly the least rate": (
+        of(CAMERA_IMAGE, lambda s: every(s, SECOND + SECOND // 1000)),
+        {("partners", "/scan", "of its messages")},
+    ),
     "a gap": (
         of(SCAN, without(10, 20)),
         {("gap", "/scan", "1 gap, the longest of 2.2 s after 1970-01-01T00:00:01.800000000Z")},

@@ -6,14 +6,13 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
 from mcap_landmarks.atomic import HeldError, atomic_file, check_target, held
+from mcap_landmarks.catalogue.application_ids import AT, LANDMARKS
 from mcap_landmarks.catalogue.catalogue_columns import COLUMNS, NEEDED, Catalogue, Row
 from mcap_landmarks.catalogue.parquet_file import from_parquet, need_pyarrow, to_parquet
 from mcap_landmarks.catalogue.sqlite_file import from_sqlite, to_sqlite
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.locations import Location, is_there
 
-_MAP_AT, _MAP = 68, b"MCLM"
-"""Where an SQLite file has its application id, and that of landmark databases; see `maps.database`."""
 _PATIENCE_S = 60.0
 """A catalogue of a million rows is written in less; who holds it for longer hangs."""
 
@@ -47,7 +46,7 @@ def is_catalogue(place: Location) -> bool:
         return suffix != ".db"
     try:
         with place.open("rb") as stream:
-            return stream.read(_MAP_AT + len(_MAP))[_MAP_AT:] != _MAP
+            return stream.read(AT + len(LANDMARKS))[AT:] != LANDMARKS
     except OSError:
         return False  # opening it says what is wrong
 

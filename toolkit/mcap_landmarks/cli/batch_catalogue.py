@@ -28,6 +28,9 @@ class BatchRows:
     def started(self, task: "Task", pid: int) -> None:
         """What starts has no row yet."""
 
+    def waits(self, task: "Task") -> None:
+        """See `cli.batch_run.Listener`: it is told when it starts again."""
+
     def ended(self, report: Report, ended: "Ended") -> None:
         """A task has ended."""
         if self._place is None:

@@ -28,6 +28,9 @@ class EventLines:
         attempt = self._tries[task] = self._tries.get(task, 0) + 1
         self._write("started" if attempt == 1 else "retried", task, {"worker": pid, "attempt": attempt})
 
+    def waits(self, task: Task) -> None:
+        """See `cli.batch_run.Listener`: it is told when it starts again."""
+
     def ended(self, report: Report, ended: Ended) -> None:
         """A task has ended."""
         names = ("outcome", "exit_code", "seconds", "peak_bytes", "attempts", "errors")

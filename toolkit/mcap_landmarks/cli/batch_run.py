@@ -15,6 +15,9 @@ class Listener(Protocol):
     def started(self, task: Task, pid: int) -> None:
         """A process works on a task from now on, for the second time if it was started before."""
 
+    def waits(self, task: Task) -> None:
+        """A task was cut, and waits for its second try."""
+
     def ended(self, report: Report, ended: Ended) -> None:
         """A task has ended and will not be tried again."""
 
@@ -31,8 +34,12 @@ def run_batch(
         for listener in listeners:
             listener.started(task, pid)
 
+    def waits(task: Task) -> None:
+        for listener in listeners:
+            listener.waits(task)
+
     try:
-        for ended in workers.run(tasks, limits, started):
+        for ended in workers.run(tasks, limits, started, waits):
             report = reports[places[ended.task]] = report_of(verb, ended, before[ended.task])
             for listener in listeners:
                 listener.ended(report, ended)

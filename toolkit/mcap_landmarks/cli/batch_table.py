@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 _PER_SECOND = 4
 """How often the table is drawn: often enough for its seconds to run."""
 
+_STATES = ("waits to run again", "runs", "runs again")
+"""By the number of a log's try, 0 where it waits for its second one."""
+
 
 class LiveTable:
     """Which logs run, how many ended how, how fast, and the time that is left."""
@@ -32,6 +35,10 @@ class LiveTable:
         attempt = self._tries[task] = self._tries.get(task, 0) + 1
         self._running[task] = time.monotonic(), attempt
 
+    def waits(self, task: Task) -> None:
+        """A task was cut, and waits for its second try: it is shown as such from now on."""
+        self._running[task] = time.monotonic(), 0
+
     def ended(self, report: Report, ended: Ended) -> None:
         """A task has ended; without a terminal that is said in a line."""
         self._running.pop(ended.task, None)
@@ -43,7 +50,7 @@ class LiveTable:
         """What is shown: a row per running log, then the totals."""
         now = time.monotonic()
         shown = [
-            (str(task.log), "runs" if attempt == 1 else "runs again", _clock(now - since))
+            (str(task.log), _STATES[attempt], _clock(now - since))
             for task, (since, attempt) in list(self._running.items())
         ]
         ended, elapsed = sum(self._counts.values()), now - self._began

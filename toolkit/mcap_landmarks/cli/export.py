@@ -1,7 +1,7 @@
 """Write a result for other tools: its trajectory, all of it for Rerun, or its boxes as a dataset of COCO."""
 
 import json as json_text
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -11,7 +11,7 @@ from mcap_landmarks.cli import options
 from mcap_landmarks.cli.console import PARTIAL, progress, say, say_json, warn
 from mcap_landmarks.cli.option_groups import reading_logs
 from mcap_landmarks.errors import UsageError
-from mcap_landmarks.locations import Location, location, size_of
+from mcap_landmarks.locations import Location, address, files_in, is_there, location, size_of
 from mcap_landmarks.wording import counted
 
 _RERUN, _COCO = "rerun", "coco"
@@ -52,14 +52,12 @@ def command(
     json: options.Json = False,
 ) -> None:
     """Write the poses of a topic of RESULT in the plane, everything for Rerun's viewer, or boxes as COCO has them."""
-    from mcap_landmarks.runs.replacing import new_files
-
     chosen = form.lower()
     _check(chosen, topic, child, images)
-    if chosen in {_RERUN, _COCO}:
-        with new_files([output], [result], overwrite=overwrite):
-            is_rerun = chosen == _RERUN
-            done = _rerun(result, output) if is_rerun else _coco(result, output, topic, images, overwrite=overwrite)
+    if chosen == _RERUN:
+        done = _rerun(result, output, overwrite=overwrite)
+    elif chosen == _COCO:
+        done = _coco(result, output, topic, images, overwrite=overwrite)
     else:
         done = _trajectory(result, output, chosen, topic, child, overwrite=overwrite)
     if json:
@@ -117,7 +115,7 @@ def _trajectory(
     return _Exported(line, told, (*track.notes, *notes), tuple(track.losses))
 
 
-def _rerun(result: Location, output: Location) -> _Exported:
+def _rerun(result: Location, output: Location, *, overwrite: bool) -> _Exported:
     from importlib.util import find_spec
 
     from mcap_landmarks.atomic import atomic_path
@@ -127,9 +125,17 @@ def _rerun(result: Location, output: Location) -> _Exported:
         raise UsageError(f"{output}: Rerun opens files by their names; use .rrd")
     if find_spec("rerun") is None:
         raise ToolkitError("rerun-sdk, which writes .rrd, is not installed; pip install 'mcap-landmarks[rerun]'")
+    from mcap_landmarks.recording.reader import open_recording
     from mcap_landmarks.report.rerun_log import write_rerun
+    from mcap_landmarks.runs.replacing import carries, output_to
 
-    with atomic_path(output) as target, progress(f"read {result.name}", size_of(result) or None) as advance:
+    with open_recording(result) as recording:
+        of_log = carries(recording.fingerprint())  # which is the id of what Rerun shows
+    with (
+        output_to(output, [result], of_log, overwrite=overwrite),
+        atomic_path(output) as target,
+        progress(f"read {result.name}", size_of(result) or None) as advance,
+    ):
         made = write_rerun(result, target, advance)
     line = f"{counted(sum(made.rows.values()), 'row')} of {len(made.rows)} entities"
     return _Exported(line, {"entities": dict(made.rows)}, (), made.losses)
@@ -140,20 +146,36 @@ def _coco(
 ) -> _Exported:
     from contextlib import ExitStack
 
-    from mcap_landmarks.atomic import atomic_file
-    from mcap_landmarks.report.coco_dataset import read_coco
-    from mcap_landmarks.runs.replacing import output_to
+    from mcap_landmarks.atomic import atomic_file, atomic_folder
+    from mcap_landmarks.report.coco_dataset import images_of, read_coco
+    from mcap_landmarks.runs.replacing import carries, output_to, picture_mark
 
+    mark = picture_mark("export", [result])
+    is_earlier = carries(mark)
     with ExitStack() as stack:
+        stack.enter_context(output_to(output, [result], is_earlier, overwrite=overwrite))
         if images is not None:
-            kept = output_to(images, [result], lambda _path: False, overwrite=overwrite, is_folder=True)
-            stack.enter_context(kept)
+            _check_beside(output, images)
+            named = images_of(output) if is_there(output) and is_earlier(output) else frozenset()
+            stack.enter_context(output_to(images, [result], _only(named), overwrite=overwrite, is_folder=True))
+        # Both appear at the end, one right after the other: who stops before has neither.
+        stream = stack.enter_context(atomic_file(output))
+        place = stack.enter_context(atomic_folder(images)) if images is not None else None
         with progress(f"read {result.name}", size_of(result) or None) as advance:
-            found = read_coco(result, topic, images, advance)
-        with atomic_file(output) as stream:
-            stream.write((json_text.dumps(found.document, indent=1) + "\n").encode())
-    counts = {name: len(entries) for name, entries in found.document.items()}
+            found = read_coco(result, topic, place, advance, mark)
+        stream.write((json_text.dumps(found.document, indent=1) + "\n").encode())
+    counts = dict(found.counts)
     line = f"{counts['annotations']} boxes of {found.topic} in {counted(counts['images'], 'image')}"
     told = {"topic": found.topic, **counts, "left_out": dict(found.left_out)}
     notes = tuple(f"{reason}: {count}, left out" for reason, count in found.left_out.items())
     return _Exported(line, told, notes, found.losses)
+
+
+def _check_beside(output: Location, images: Location) -> None:
+    if f"{address(output)}/".startswith(f"{address(images)}/"):
+        raise UsageError(f"{output} lies in {images}, which is replaced as a whole; name a file beside that folder")
+
+
+def _only(names: Collection[str]) -> Callable[[Location], bool]:
+    """Says of a folder whether it has none but files of these names."""
+    return lambda folder: {place.name for place in files_in(folder)} <= set(names)

@@ -16,7 +16,7 @@ import psutil
 from pebble import ProcessPool
 
 from mcap_landmarks.fleet.cuts import clear, over_memory, over_time, was_killed
-from mcap_landmarks.fleet.tasks import TRIES, CommandLine, Ended, Started, Task, TaskLimits
+from mcap_landmarks.fleet.tasks import TRIES, CommandLine, Ended, Started, Task, TaskLimits, Waits
 from mcap_landmarks.fleet.worker import INTERRUPTED, run_task, use_one_thread
 
 _LAST_WORDS_S = 10.0
@@ -37,7 +37,7 @@ class LocalWorkers:
     def __init__(self, count: int, command_line: CommandLine) -> None:
         self._count, self._command_line = count, command_line
 
-    def run(self, tasks: Sequence[Task], limits: TaskLimits, started: Started) -> Iterator[Ended]:
+    def run(self, tasks: Sequence[Task], limits: TaskLimits, started: Started, waits: Waits) -> Iterator[Ended]:
         """See `fleet.tasks.Workers`."""
         waiting = deque((task, 1) for task in tasks)
         news = _News()
@@ -51,6 +51,7 @@ class LocalWorkers:
                     continue
                 if ended.cut is not None and ended.attempts < TRIES:
                     waiting.append((ended.task, ended.attempts + 1))
+                    waits(ended.task)
                     continue
                 if ended.cut is not None:
                     clear(ended.task)

@@ -36,7 +36,7 @@ def _run(workers: Workers, segments: Sequence[SegmentTask]) -> Iterator[SegmentT
         Task(one.log, one.target, ("detect", str(one.log), "-o", str(one.target), "--segment", one.text, *lenient))
         for one in segments
     ]
-    for ended in workers.run(tasks, TaskLimits(), lambda _task, _pid: None):
+    for ended in workers.run(tasks, TaskLimits(), lambda _task, _pid: None, lambda _task: None):
         if ended.exit_code:
             raise RecordingError(_why(ended))
         yield by_target[ended.task.output]

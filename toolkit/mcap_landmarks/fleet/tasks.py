@@ -12,6 +12,8 @@ Cut = Literal["killed", "time", "memory"]
 """What ended a task before its own end: somebody's signal, or a limit."""
 Started = Callable[["Task", int], None]
 """Is told that a task starts, again for its second try, and the id of the process that works on it."""
+Waits = Callable[["Task"], None]
+"""Is told that a task was cut, and waits for its second try."""
 
 TRIES = 2
 """A task that was cut gets one retry; what ends with an error of its own would end so again."""
@@ -64,7 +66,7 @@ class Ended:
 class Workers(Protocol):
     """Run tasks, several at a time."""
 
-    def run(self, tasks: Sequence[Task], limits: TaskLimits, started: Started) -> Iterator[Ended]:
+    def run(self, tasks: Sequence[Task], limits: TaskLimits, started: Started, waits: Waits) -> Iterator[Ended]:
         """Run the tasks, each of which ends, whatever becomes of its worker; in the order in which they end.
 
         A task that was cut gets `TRIES`. Where the iteration is broken off, as by Ctrl-C, the running ones clean up

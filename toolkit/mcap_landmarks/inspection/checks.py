@@ -23,6 +23,8 @@ from mcap_landmarks.recording.time_association import BESIDE_NS, WINDOW_NS
 LEAST_HZ = {"image": 1.0, "scan": 2.0, "odometry": 5.0}
 """Rates below which much is lost between two messages, for a robot that walks."""
 
+_SLOW = 1.05
+"""By so much a usual period may be longer than that: clocks of recorders jitter, and are told to two digits."""
 _LONG_GAP_NS = 10**9
 _GAP_PERIODS = 10
 """A gap is told where it is longer than both a second and so many usual periods."""
@@ -76,7 +78,7 @@ def _rates(found: Survey) -> Iterator[Finding]:
         if least is None or len(log_ns) < 2:
             continue
         seconds = float(np.median(np.diff(log_ns))) * 1e-9
-        if seconds * least > 1:
+        if seconds * least > _SLOW:
             text = f"{1 / seconds:.2g} Hz is slow for {sensor.role} messages"
             yield Finding("warning", "rate", sensor.topic, text, f"record at {least:g} Hz or more, or drive slower")
 

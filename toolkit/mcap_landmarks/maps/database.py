@@ -10,14 +10,14 @@ import numpy as np
 
 from mcap_landmarks import memory
 from mcap_landmarks.atomic import atomic_file
+from mcap_landmarks.catalogue.application_ids import LANDMARKS
 from mcap_landmarks.errors import MapError
 from mcap_landmarks.locations import Location, is_there, to_read
 from mcap_landmarks.maps.model import Group, LandmarkMap, MapSource
 from mcap_landmarks.maps.neighbours import Neighbours
 from mcap_landmarks.resources import resource
 
-APPLICATION_ID = 0x4D434C4D
-"""Tells our SQLite files from others: the letters MCLM."""
+_APPLICATION_ID = int.from_bytes(LANDMARKS, "big")
 SCHEMA_VERSION = 1
 _NUMBERS = ("x_m", "y_m", "var_x_m2", "cov_xy_m2", "var_y_m2", "radius_m")
 _COLUMNS = [("number", "i8"), ("id", "O"), ("class", "O"), *((name, "f8") for name in _NUMBERS)]
@@ -107,7 +107,7 @@ def _reading(path: Location) -> Iterator[sqlite3.Connection]:
 def _check_version(path: Location, database: sqlite3.Connection) -> None:
     application = database.execute("PRAGMA application_id").fetchone()[0]
     version = database.execute("PRAGMA user_version").fetchone()[0]
-    if application != APPLICATION_ID:
+    if application != _APPLICATION_ID:
         raise MapError(f"{path}: is an SQLite file but no landmark database; name one that `map` made")
     if version != SCHEMA_VERSION:
         raise MapError(

@@ -4,6 +4,8 @@ Images and categories have the same numbers whichever boxes are written, so that
 detector can be held against each other with COCO's own tools.
 """
 
+import contextlib
+import json
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,7 +14,6 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from mcap_landmarks.atomic import atomic_folder
 from mcap_landmarks.channels import DETECTIONS, TRUTH_DETECTIONS
 from mcap_landmarks.coco import NAMES
 from mcap_landmarks.errors import MessageError, RecordingError, UsageError
@@ -44,16 +45,23 @@ _JPEG, _PNG = b"\xff\xd8", b"\x89PNG"
 
 @dataclass(frozen=True, slots=True)
 class CocoDataset:
-    """The document, the topic of its boxes, why boxes or images are left out, and what could not be read."""
+    """The document, how many entries it has by kind, the topic of its boxes, why boxes or images are left out, and what
+    could not be read.
+    """
 
-    document: Mapping[str, list[Entry]]
+    document: Mapping[str, object]
+    counts: Mapping[str, int]
     topic: str
     left_out: Mapping[str, int]
     losses: tuple[str, ...]
 
 
-def read_coco(path: Location, topic: str | None, folder: Location | None, progress: Progress) -> CocoDataset:
+def read_coco(
+    path: Location, topic: str | None, folder: Path | None, progress: Progress, about: str = ""
+) -> CocoDataset:
     """The boxes of a topic, by default those of `detect`, else the truth; the images are written into `folder`, too.
+
+    The document says `about` itself.
 
     Raises:
         UsageError: the topic has no boxes.
@@ -68,15 +76,24 @@ def read_coco(path: Location, topic: str | None, folder: Location | None, progre
         choice = Choice({"image": images[0]}) if len(images) == 1 else Choice(images=tuple(images))
         log = RecordedLog(recording, Span(choice)).layered([Layer(recording, recording.channels)])
         left_out = Counter[str]()
-        entries, numbers = _images(log, images, folder, left_out, progress)
+        entries, numbers = _numbered(_decoded(log, images, left_out, progress), folder)
         categories = _categories(recording, view)
         annotations = _annotations(recording, boxes, (entries, numbers), categories, left_out)
-        document = {
+        document: dict[str, object] = {
+            "info": {"description": about},
             "images": entries,
             "annotations": annotations,
             "categories": [{"id": number, "name": name} for name, number in categories.items()],
         }
-        return CocoDataset(document, boxes.topic, left_out, tuple(log.losses))
+        counts = {"images": len(entries), "annotations": len(annotations), "categories": len(categories)}
+        return CocoDataset(document, counts, boxes.topic, left_out, tuple(log.losses))
+
+
+def images_of(place: Location) -> frozenset[str]:
+    """The names of the images' files in a document that `read_coco` made; none where it is damaged."""
+    with contextlib.suppress(ValueError, KeyError, TypeError), place.open("rb") as stream:
+        return frozenset(str(entry["file_name"]) for entry in json.load(stream)["images"])
+    return frozenset()
 
 
 def _boxes(recording: Recording, view: ViewedLog, topic: str | None) -> Connection:
@@ -89,16 +106,6 @@ def _boxes(recording: Recording, view: ViewedLog, topic: str | None) -> Connecti
     if found is None or found.read_as != Detections.ROS_TYPE:
         raise UsageError(f"{recording.path}: {topic} has no boxes in images; mcap-landmarks info lists the topics")
     return found
-
-
-def _images(
-    log: LayeredLog, topics: list[str], folder: Location | None, left_out: Counter[str], progress: Progress
-) -> tuple[list[Entry], dict[tuple[str, int], int]]:
-    """An entry for each image, and its number by frame and stamp; their files go into the folder."""
-    if folder is not None:
-        with atomic_folder(folder) as place:
-            return _numbered(_decoded(log, topics, left_out, progress), place)
-    return _numbered(_decoded(log, topics, left_out, progress), None)
 
 
 def _numbered(

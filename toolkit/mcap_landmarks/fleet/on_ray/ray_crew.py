@@ -16,7 +16,7 @@ from ray.exceptions import RayError
 from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.fleet.cuts import clear, over_time, was_killed
 from mcap_landmarks.fleet.on_ray.ray_actor import LAST_WORDS_S, FleetActor, Greeting
-from mcap_landmarks.fleet.tasks import TRIES, CommandLine, Ended, Started, Task, TaskLimits
+from mcap_landmarks.fleet.tasks import TRIES, CommandLine, Ended, Started, Task, TaskLimits, Waits
 from mcap_landmarks.manifest import code_hash
 from mcap_landmarks.wording import counted
 
@@ -83,7 +83,7 @@ class Crew:
         for _ in range(self._needs.actors):
             self._greet(_Member(cast("ActorHandle[FleetActor]", made.remote(command_line, folder))))
 
-    def run(self, tasks: Sequence[Task], started: Started) -> Iterator[Ended]:
+    def run(self, tasks: Sequence[Task], started: Started, waits: Waits) -> Iterator[Ended]:
         """Work on all tasks; how each ended, in the order in which they end.
 
         Raises:
@@ -96,6 +96,7 @@ class Crew:
             for ended in self._ended():
                 if ended.cut is not None and ended.attempts < TRIES:
                     queue.append((ended.task, ended.attempts + 1))
+                    waits(ended.task)
                 else:
                     left -= 1
                     self._given_up += [ended.task] if ended.cut is not None else []

@@ -8,7 +8,7 @@ import ray
 from mcap_landmarks.errors import ToolkitError
 from mcap_landmarks.fleet.on_ray.ray_connection import connected
 from mcap_landmarks.fleet.on_ray.ray_crew import INSTALL, Crew, Needs
-from mcap_landmarks.fleet.tasks import CommandLine, Ended, Started, Task, TaskLimits
+from mcap_landmarks.fleet.tasks import CommandLine, Ended, Started, Task, TaskLimits, Waits
 from mcap_landmarks.vision.config import ProviderChoice
 
 
@@ -32,7 +32,7 @@ class RayWorkers:
         self._command_line, self._address, self._wanted = command_line, address, wanted
         self._provider, self._say = provider, say
 
-    def run(self, tasks: Sequence[Task], limits: TaskLimits, started: Started) -> Iterator[Ended]:
+    def run(self, tasks: Sequence[Task], limits: TaskLimits, started: Started, waits: Waits) -> Iterator[Ended]:
         """See `Workers`.
 
         Raises:
@@ -46,7 +46,7 @@ class RayWorkers:
             crew = Crew(needs, limits, self._say)
             try:
                 crew.begin(self._command_line, Path.cwd())
-                yield from crew.run(tasks, started)
+                yield from crew.run(tasks, started, waits)
             except ConnectionError as error:
                 told = " ".join(str(error).split())
                 raise ToolkitError(f"--ray {self._address}: {told}; {INSTALL}, and see that they are up") from error
