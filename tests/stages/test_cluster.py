@@ -275,3 +275,16 @@ def test_any_scan_gives_sound_objects(values: list[float]) -> None:
         assert sum(share for _, share in options) == pytest.approx(1.0)
         assert np.isfinite(points).all()
         assert (np.linalg.eigvalsh(spreads) > 0).all()
+
+
+def test_scans_that_scatter_more_than_assumed_are_counted() -> None:
+    rng = np.random.default_rng(2)
+    exact = ranges([*THINGS, disc(-2.0, 0.5, 0.15), box(-1.5, -2.0, 1.0, 0.5, 0.28)])
+    bundles = [bundle(scan(exact + rng.normal(0.0, 0.03, len(exact))), mounting()) for _ in range(12)]
+    left_out = [one for one in process(bundles, ClusterConfig(), {}) if isinstance(one, Omission)]
+    assert len(left_out) == 12
+    assert {one.reason for one in left_out} == {
+        "scans whose ranges scatter by 0.028 m about what they show, where cluster.sigma_m is 0.01; it is less sure"
+    }
+    assert not any(one.lost for one in left_out)
+    assert not [one for one in process(bundles, ClusterConfig(sigma_m=0.03), {}) if isinstance(one, Omission)]

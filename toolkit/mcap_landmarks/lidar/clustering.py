@@ -11,7 +11,7 @@ from mcap_landmarks.lidar.beams import Beams
 from mcap_landmarks.lidar.cells import Noise
 from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.objects import Hypotheses, objects
-from mcap_landmarks.lidar.segments import Breaks, near_clusters, segments
+from mcap_landmarks.lidar.segments import Breaks, Cluster, near_clusters, segments
 from mcap_landmarks.lidar.shapes import Shape
 
 Shapes = Mapping[str, Sequence[Shape]]
@@ -41,8 +41,17 @@ def _shape(section: Section) -> Shape:
 
 def cluster(beams: Beams, shapes: Shapes, config: ClusterConfig) -> list[Hypotheses]:
     """The objects of one scan, in the base frame; `shapes` are those of the configuration."""
+    return objects(beams, pieces(beams, shapes, config), shapes, noise_of(config))
+
+
+def pieces(beams: Beams, shapes: Shapes, config: ClusterConfig) -> list[Cluster]:
+    """What of a scan can be objects, before shapes say what belongs together."""
     reach = max((shape.reach_m for options in shapes.values() for shape in options), default=_WITHOUT_SHAPES_M)
     largest = 2 * reach + 6 * config.sigma_m if config.largest_m is None else config.largest_m
     breaks = Breaks(np.deg2rad(config.incidence_deg), config.sigma_m, config.link_m)
-    noise = Noise(config.sigma_m, config.dropout, config.stray)
-    return objects(beams, near_clusters(beams, segments(beams, breaks, largest), config.near_m), shapes, noise)
+    return near_clusters(beams, segments(beams, breaks, largest), config.near_m)
+
+
+def noise_of(config: ClusterConfig) -> Noise:
+    """The noise that a configuration assumes."""
+    return Noise(config.sigma_m, config.dropout, config.stray)

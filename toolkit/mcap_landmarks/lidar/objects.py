@@ -84,13 +84,23 @@ def objects(
     Neighbouring clusters make one object where that explains them better than an object each: the legs of a person, a
     box and its far corner, or what two LiDARs see of one thing.
     """
-    named = [(name, shape) for name, options in shapes.items() for shape in options]
+    named = _named(shapes)
     explain = _Explainer(beams, named, _priors(shapes), noise)
     joined = _joined(beams, clusters, explain)
     return [
         _ranked([name for name, _ in named], explained, beams, cluster, noise)
         for cluster, explained in zip(joined, explain(joined), strict=True)
     ]
+
+
+def evidence(beams: Beams, clusters: Sequence[Cluster], shapes: Mapping[str, Sequence[Shape]], noise: Noise) -> float:
+    """The logarithm of how likely a noise makes the hits of clusters, each taken for an object."""
+    explain = _Explainer(beams, _named(shapes), _priors(shapes), noise)
+    return sum(one.total for one in explain(clusters))
+
+
+def _named(shapes: Mapping[str, Sequence[Shape]]) -> list[tuple[str, Shape]]:
+    return [(name, shape) for name, options in shapes.items() for shape in options]
 
 
 def _priors(shapes: Mapping[str, Sequence[Shape]]) -> Array:

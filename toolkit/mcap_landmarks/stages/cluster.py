@@ -25,6 +25,7 @@ from mcap_landmarks.lidar.clustering import cluster, shapes_of
 from mcap_landmarks.lidar.config import ClusterConfig
 from mcap_landmarks.lidar.object_tracks import PieceChange, Tracks
 from mcap_landmarks.lidar.objects import Hypotheses
+from mcap_landmarks.lidar.range_noise import with_noise
 from mcap_landmarks.lidar.scan_beams import beams_of, check_level, returns_nothing
 from mcap_landmarks.lidar.skew import is_timed, offsets_s, skew_covariances, unsure_motion
 from mcap_landmarks.lidar.whole_clouds import CloudObject, WholeCloud, points_in_base, whole_cloud
@@ -46,6 +47,7 @@ _NO_ODOMETRY = "scans that could not be de-skewed without odometry; what they sh
 _NO_TIMES = (
     "scans that could not be de-skewed: their beams have no times, and the robot moves; what they show is less sure"
 )
+_NOISIER = "scans whose ranges scatter by {:.3f} m about what they show, where cluster.sigma_m is {:g}; it is less sure"
 
 
 def process(
@@ -64,18 +66,16 @@ def process(
         return
     shapes = shapes_of(config)
     tracks, anew = Tracks(config.gate_m, config.memory_s), PieceChange()
-    # While one cloud is clustered, others are read, turned and written.
-    for scan, whole in in_order(_scans(bundles, mounting, config), _points, partial(_clustered, config=config)):
+    looks = _looks(bundles, mounting, config)
+    for (scan, whole), beams, known in with_noise(looks, shapes, config, _is_large):
         bundle, base = scan.bundle, scan.base
         if anew.at(bundle.odometry.piece if bundle.odometry else None):
             tracks.forget()
         if whole is not None:
             yield from _of_cloud(bundle, base, tracks, whole)
-            if not len(whole.clusters):
-                yield Omission(bundle.log_time_ns, _NOTHING_STANDS)
+        if beams is None:
             continue
-        found = cluster(_beams(bundle, base, mounting, config), shapes, config)
-        found, is_skewed = _unsure(bundle, base, mounting, config, found)
+        found, is_skewed = _unsure(bundle, base, mounting, known, cluster(beams, shapes, known))
         places = np.array([one.shares @ one.positions_xy for one in found]).reshape(-1, 2)
         odom_from_base = None if bundle.odometry is None else bundle.odometry.odom_from_base
         names = tracks.names(bundle.stamp_ns, odom_from_base, places)
@@ -83,6 +83,8 @@ def process(
         yield from _without_returns(bundle)
         if is_skewed:
             yield Omission(bundle.log_time_ns, _NO_ODOMETRY if bundle.odometry is None else _NO_TIMES)
+        if known.sigma_m > config.sigma_m:
+            yield Omission(bundle.log_time_ns, _NOISIER.format(known.sigma_m, config.sigma_m))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,6 +101,21 @@ def _scans(bundles: Iterable[Bundle], mounting: Mounting, config: ClusterConfig)
         base = _base_of(bundle, mounting)
         is_whole = config.slice_m is None and isinstance(bundle.messages[SCAN], PointCloud2)
         yield _Scan(bundle, base, _clouds(bundle, base, mounting) if is_whole else ())
+
+
+def _looks(
+    bundles: Iterable[Bundle], mounting: Mounting, config: ClusterConfig
+) -> Iterator[tuple[tuple[_Scan, WholeCloud | None], Beams | None]]:
+    """Scans with what clouds show as a whole, and the beams of all others."""
+    # While one cloud is clustered, others are read, turned and written.
+    for scan, whole in in_order(_scans(bundles, mounting, config), _points, partial(_clustered, config=config)):
+        beams = _beams(scan.bundle, scan.base, mounting, config) if whole is None else None
+        yield (scan, whole), beams
+
+
+def _is_large(look: tuple[_Scan, WholeCloud | None]) -> bool:
+    """Whether a scan is a cloud, of which only few fit into the memory."""
+    return any(isinstance(look[0].bundle.messages.get(channel), PointCloud2) for channel in (SCAN, SECOND_SCAN))
 
 
 def _clouds(bundle: Bundle, base: str, mounting: Mounting) -> tuple[tuple[PointCloud2, Array], ...]:
@@ -125,13 +142,15 @@ def _clustered(points: tuple[Array, Array] | None, config: ClusterConfig) -> Who
     return None if points is None else whole_cloud(*points, config)
 
 
-def _of_cloud(bundle: Bundle, base: str, tracks: Tracks, found: WholeCloud) -> Iterator[Stamped]:
+def _of_cloud(bundle: Bundle, base: str, tracks: Tracks, found: WholeCloud) -> Iterator[Stamped | Omission]:
     """The points above the ground of a bundle's clouds, and a box around each of their clusters."""
     middles = np.array([one.rectangle.centre_xy for one in found.objects]).reshape(-1, 2)
     names = tracks.names(bundle.stamp_ns, None if bundle.odometry is None else bundle.odometry.odom_from_base, middles)
     cloud = ClusteredCloud(bundle.stamp_ns, base, found.points_m, found.heights_m, found.clusters)
     yield Stamped(SCAN_OBJECTS, bundle.log_time_ns, _boxed(bundle.stamp_ns, base, names, found.objects))
     yield Stamped(CLUSTERED_CLOUD, bundle.log_time_ns, cloud)
+    if not len(found.clusters):
+        yield Omission(bundle.log_time_ns, _NOTHING_STANDS)
 
 
 def _base_of(bundle: Bundle, mounting: Mounting) -> str:
