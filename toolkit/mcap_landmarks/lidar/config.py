@@ -33,9 +33,9 @@ class ClusterConfig:
     """How scans become objects.
 
     `shapes`: the cross-sections of classes at the LiDAR's height, each a list of tables with a `kind` (disc, legs, box,
-    parts); classes that are not named keep theirs, an empty list takes one out. `sigma_m`: noise of a range, or more where
-    the scans scatter more about these shapes (`range_noise`); `dropout`: share of beams that return nothing from an
-    object; `stray`: share of hits that are something else's.
+    parts); classes that are not named keep theirs, an empty list takes one out. `sigma_m`: noise of a range, and more
+    where the scans scatter more about these shapes (`range_noise`); `dropout`: share of beams that return nothing from
+    an object; `stray`: share of hits that are something else's.
     `incidence_deg`: no surface is met at a smaller angle, so that neighbouring hits farther apart are of two; `link_m`:
     hits of one piece are no farther apart, and pieces no farther apart than `near_m` are one. What is larger than
     `largest_m` is background; unset, what is larger than every shape. `range_m` and `view_deg` limit what is looked at:
