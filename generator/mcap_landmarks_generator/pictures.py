@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from mcap_landmarks.geometry.se2 import transform_points
+from mcap_landmarks.messages.images import CompressedImage
 from mcap_landmarks.messages.scan import LaserScan
 from mcap_landmarks.stage import Stamped
 from numpy.typing import NDArray
@@ -17,8 +18,8 @@ from mcap_landmarks_generator.checks import Staged, stage
 from mcap_landmarks_generator.drawing import Image
 from mcap_landmarks_generator.lidar import beam_angles
 from mcap_landmarks_generator.loading import load_scenario
-from mcap_landmarks_generator.optics import Optics
 from mcap_landmarks_generator.renderer import Renderer
+from mcap_landmarks_generator.rendering import Photographer
 from mcap_landmarks_generator.ring_cloud import RingCloud
 from mcap_landmarks_generator.robot import SCAN_IN_BASE_M
 from mcap_landmarks_generator.simulation import Simulation
@@ -29,7 +30,6 @@ Floats = NDArray[np.float64]
 _FOLDER = Path(__file__).parents[1] / "images"
 _WAY, _BEAM, _FIELD = (255, 200, 0), (255, 60, 40), (40, 160, 255)
 _FULL_TURN_DEG = 360
-_PLACES = ("street", "campus", "warehouse", "seasons")
 
 
 def make_all() -> None:
@@ -42,8 +42,7 @@ def make_all() -> None:
     for name in sorted(bundled()):
         if not name.endswith("_drift"):
             _write(name, first_good_image(stage(load_scenario(name))))
-    for name in _PLACES:
-        _write(f"{name}_lidar", returns_from_above(stage(load_scenario(name))))
+            _write(f"{name}_lidar", returns_from_above(stage(load_scenario(name))))
 
 
 def top_view(staged: Staged, width_px: int, side_m: float) -> Image:
@@ -109,7 +108,7 @@ def returns_from_above(staged: Staged, after_s: float = 8.0, size_px: tuple[int,
     elif isinstance(message, LaserScan):
         seen, angles = np.isfinite(message.ranges_m), beam_angles(staged.scenario.lidar)
         ahead = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        points = (message.ranges_m[:, None] * ahead)[seen]
+        points = message.ranges_m[seen, None] * ahead[seen]
         shades = message.intensities[seen] / 255 if len(message.intensities) else np.full(len(points), 0.5)
     shades = np.rint(255 * np.clip(shades, 0.0, 1.0)).astype(np.uint8)
     colours = cv2.applyColorMap(shades[:, None], cv2.COLORMAP_TURBO)[:, 0, ::-1]
@@ -123,17 +122,18 @@ def returns_from_above(staged: Staged, after_s: float = 8.0, size_px: tuple[int,
 
 
 def first_good_image(staged: Staged) -> Image:
-    """The first image of a recording, some way into it, that shows at least three objects well."""
-    optics = Optics(staged.scenario.camera, Intrinsics.of(staged.scenario.camera).focal_px, staged.scenario.seed)
+    """The first image of a recording's camera, some way into it, that shows at least three objects well."""
     renderer = Renderer(staged.scenario, staged.objects)
     for event in Simulation(staged).run():
-        if not isinstance(event, ImageJob) or event.index % 5:
+        if not isinstance(event, ImageJob) or event.index % 5 or event.camera:
             continue
-        rendered = renderer.draw(event.view)
-        large = [one for one in rendered.visible if one.window.height > 40 and one.window.left > 0]
+        job = event
+        large = [one for one in renderer.draw(job.view).visible if one.window.height > 40 and one.window.left > 0]
         if len(large) >= 3:
-            return optics.expose(rendered.image, event.index, event.turn_radps)
-    return rendered.image
+            break
+    taken = next(each.message for each in Photographer(staged).take(job) if isinstance(each.message, CompressedImage))
+    image = np.asarray(cv2.imdecode(np.frombuffer(taken.data, np.uint8), cv2.IMREAD_COLOR), np.uint8)
+    return np.ascontiguousarray(image[..., ::-1])
 
 
 def _from_above(staged: Staged, eye: Floats, width_px: int, side_m: float) -> tuple[Viewpoint, Image]:

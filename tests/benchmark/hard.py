@@ -53,6 +53,8 @@ EFFECTS: Mapping[str, tuple[str, ...]] = {
         f"odometry.{key}" for key in ("radius_error", "baseline_error", "distance_slip", "heading_slip_deg")
     ),
     "frames that come late": ("robot.frames_after_s",),
+    "panes of glass": ("objects",),
+    "a second camera": ("cameras",),
 }
 BESIDE = ("ring_lidar", "imu")
 """Sensors of `hard` that localizing by camera and planar LiDAR does not read: a row of their own would say nothing."""
@@ -112,6 +114,8 @@ def taken(hard: Mapping[str, Any], keys: tuple[str, ...] | None) -> dict[str, An
 def scenario(path: Path, settings: Mapping[str, Any]) -> None:
     """Write a scenario with some settings over those of `small`."""
     laid = {**settings, "camera": {**settings.get("camera", {}), **CAMERA}}
+    if "cameras" in settings:
+        laid["cameras"] = [{**camera, **CAMERA} for camera in settings["cameras"]]
     lines = ['extends = "small"', *(f"{key} = {toml(value)}" for key, value in laid.items())]
     path.write_text("\n".join(lines) + "\n")
 
@@ -127,7 +131,7 @@ def driven(path: Path, seed: int, database: Path, folder: Path) -> Drive:
     """Generate a drive, localize it, and hold it against its truth."""
     log, out = folder / "drive.mcap", folder / "localized.mcap"
     call("generate", path, "-o", log, "--seed", seed, "--overwrite")
-    bundles = call("localize", log, "--map", database, "-o", out, "--overwrite")["bundles"]
+    bundles = call("localize", log, "--map", database, "--image", "all", "-o", out, "--overwrite")["bundles"]
     with open_recording(location(str(out))) as recording:
         found = detector_statistics(recording)
     judged, true, missed = (

@@ -38,7 +38,7 @@ PLACES: Mapping[str, tuple[str, ...]] = {
     "seasons": (),
     "street": _RINGS,
     "campus": _RINGS,
-    "hard": (),
+    "hard": ("--image", "all"),
 }
 """By name, the words with which `map` and `localize` read its drives."""
 SECOND: Mapping[str, tuple[str, ...]] = {"seasons": ("--set", "session=2")}
