@@ -12,25 +12,25 @@ BARREL_M = 0.15
 
 
 def shape(rng: np.random.Generator) -> list[Solid]:
-    """A hydrant of 0.75 to 0.95 m; the barrel's radius is fixed."""
-    tall = rng.uniform(0.88, 1.1)
+    """A hydrant of 0.75 to 0.9 m; the barrel's radius is fixed."""
+    tall = rng.uniform(1.0, 1.15)
     r, shoulder = BARREL_M, 0.56 * tall
     bonnet = rng.uniform(0.9, 1.12)
     solids = [
         lathe([(1.45 * r, 0), (1.45 * r, 0.035), (1.12 * r, 0.04), (r, 0.07)], "body", sides=20),
         lathe([(r, 0.05), (r, 0.22), (0.9 * r, 0.30), (0.88 * r, shoulder)], "body", sides=24),
         lathe([(1.0 * r, 0.28), (1.06 * r, 0.285), (1.06 * r, 0.315), (0.95 * r, 0.32)], "body", sides=20),
-        lathe([(1.3 * r, shoulder), (1.3 * r, shoulder + 0.045), (1.1 * r, shoulder + 0.05)], "cap", sides=20),
-        lathe(_bonnet(r, shoulder + 0.05, 0.15 * bonnet), "cap", sides=20),
-        lathe([(0.30 * r, 0), (0.26 * r, 0.065)], "nut", sides=5).moved(z_m=shoulder + 0.05 + 0.15 * bonnet),
+        lathe([(1.45 * r, shoulder), (1.45 * r, shoulder + 0.045), (1.25 * r, shoulder + 0.05)], "cap", sides=20),
+        lathe(_bonnet(r, shoulder + 0.05, 0.13 * bonnet), "cap", sides=20),
+        lathe([(0.30 * r, 0), (0.26 * r, 0.05)], "nut", sides=5).moved(z_m=shoulder + 0.05 + 0.13 * bonnet),
     ]
     for turn in range(8):
         bolt = lathe([(0.018, 0.03), (0.018, 0.06)], "nut", sides=5).moved(1.27 * r)
         solids.append(bolt.turned((0, 0, 1), (turn + 0.5) * np.pi / 4))
-        top = lathe([(0.014, -0.012), (0.014, 0.062)], "nut", sides=4).moved(1.19 * r, z_m=shoulder)
+        top = lathe([(0.014, -0.012), (0.014, 0.062)], "nut", sides=4).moved(1.34 * r, z_m=shoulder)
         solids.append(top.turned((0, 0, 1), (turn + 0.5) * np.pi / 4))
     height = shoulder - rng.uniform(0.1, 0.13) * tall
-    solids += _nozzle(0.058, height, np.pi / 2) + _nozzle(0.058, height, -np.pi / 2) + _nozzle(0.082, height - 0.03, 0)
+    solids += _nozzle(0.058, height, np.pi / 2) + _nozzle(0.058, height, -np.pi / 2) + _nozzle(0.07, height - 0.03, 0)
     return solids
 
 
@@ -55,7 +55,7 @@ def _nozzle(radius: float, height: float, heading: float) -> list[Solid]:
 def paint(rng: np.random.Generator) -> dict[str, Image]:
     """Mostly red or yellow all over; bonnet and caps at times a little darker, or silver."""
     red = hsv(rng.uniform(-0.02, 0.02), rng.uniform(0.8, 1), rng.uniform(0.6, 0.95))
-    yellow = hsv(rng.uniform(0.12, 0.16), rng.uniform(0.8, 1), rng.uniform(0.75, 1))
+    yellow = hsv(rng.uniform(0.10, 0.14), rng.uniform(0.8, 1), rng.uniform(0.75, 1))
     body = pick(rng, (red, red, red, red, red, yellow, yellow, yellow, yellow, grey(rng, 0.85, 0.97)))
     cap = pick(rng, (body, body, body, 0.85 * body, 0.85 * body, grey(rng, 0.65, 0.95)))
     return {

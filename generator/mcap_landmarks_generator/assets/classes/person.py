@@ -1,4 +1,4 @@
-"""Person: standing or striding in trousers, or in a coat over trousers so wide that a LiDAR sees them."""
+"""Person: standing or striding in trousers, or in a coat over flared ones so wide that a LiDAR sees them."""
 
 from functools import partial
 
@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from mcap_landmarks_generator.assets import section
 from mcap_landmarks_generator.assets.asset import AssetClass, Variant
 from mcap_landmarks_generator.assets.section import Disc, Section
-from mcap_landmarks_generator.assets.shapes import circle, ellipsoid, limb, stack
+from mcap_landmarks_generator.assets.shapes import circle, ellipsoid, limb, loft, stack
 from mcap_landmarks_generator.assets.solid import Floats, Solid, vector
 from mcap_landmarks_generator.assets.texture import (
     Colour,
@@ -17,14 +17,11 @@ from mcap_landmarks_generator.assets.texture import (
     ellipse,
     grey,
     hsv,
-    noise,
     pick,
     plain,
     polygon,
-    rectangle,
-    to_image,
+    stroke,
     vivid,
-    weathered,
 )
 
 # Height, depth and width (radii) of a body of 1.75 m in a shirt and in a coat.
@@ -33,14 +30,20 @@ SHIRT_LEVELS = (
     (1.40, 0.105, 0.19), (1.45, 0.08, 0.15), (1.48, 0.062, 0.085), (1.51, 0.05, 0.06),
 )  # fmt: skip
 COAT_LEVELS = (
-    (0.36, 0.185, 0.215), (0.58, 0.140, 0.195), (0.82, 0.128, 0.185), (1.03, 0.112, 0.16), (1.18, 0.112, 0.165),
+    (0.60, 0.165, 0.21), (0.82, 0.140, 0.192), (1.03, 0.112, 0.16), (1.18, 0.112, 0.165),
     (1.30, 0.12, 0.185), (1.40, 0.108, 0.195), (1.45, 0.082, 0.155), (1.49, 0.064, 0.085), (1.53, 0.066, 0.072),
 )  # fmt: skip
+# Height, middle and radii of a leg of flared trousers, and its way from half a disc (0) to an ellipse (1).
+FLARE_LEVELS = (
+    (0.105, 0.0, 0.25, 0.25, 0.0), (0.20, 0.0, 0.25, 0.25, 0.0), (0.25, 0.05, 0.19, 0.155, 0.4),
+    (0.32, 0.10, 0.135, 0.10, 0.85), (0.46, 0.105, 0.10, 0.09, 1.0),
+)  # fmt: skip
+SLIT_M = 0.003
+"""So far the hems reach into each other."""
 SHIN_M = 0.06
 COAT_M = 0.25
-# Where the picture of the long clothes, from below up by length, has the coat's hem and the upper end of the gap
-# between the legs, whose colour is that of what lies in their shade.
-COAT_HEM_V, CROTCH_V, GAP = (0.42, 0.55), 0.5, (48.0, 46.0, 44.0)
+COAT_HEM_V = 0.17
+"""Where the coat's picture, from the middle of its lower end up by length, has its hem."""
 # Where the shins stand: (x, y) of the left and of the right one.
 STANCES = {"legs": ((0.0, 0.10), (0.0, -0.10)), "stride": ((0.13, 0.08), (-0.13, -0.08))}
 ON_LEGS = {name: Section(tuple(Disc(SHIN_M, x, y) for x, y in stance)) for name, stance in STANCES.items()}
@@ -89,17 +92,29 @@ def _torso(k: float, broad: float) -> Solid:
 
 
 def _coat(k: float, broad: float) -> list[Solid]:
-    """A coat over trousers of fixed width at their hem, with shoes under them."""
-    hem = circle(COAT_M, 24)
-    wide = [(z * k, circle(1.0, 24) * (x, y) * (1 if z < 0.6 else k * broad)) for z, x, y in COAT_LEVELS]
-    skirt = [(0.105, hem), (0.22, hem)]
-    belt = circle(k * broad, 20) * (0.128, 0.176)
-    return [
-        stack(skirt + wide, "trousers"),
-        stack([(1.01 * k, belt), (1.05 * k, belt)], "shoes"),
-        _shoe(np.array([0.06, 0.09, 0.0])),
-        _shoe(np.array([0.06, -0.09, 0.0])),
-    ]
+    """A coat down to the knees over flared trousers, whose hems meet in a disc of fixed width."""
+    levels = [(z * k, circle(k * broad, 16) * (x, y)) for z, x, y in COAT_LEVELS]
+    solids = [stack(levels, "coat")]
+    for side in (1, -1):
+        solids += [_flared_leg(side, k, broad), _shoe(np.array([0.06, side * 0.09, 0.0]))]
+    return solids
+
+
+def _flared_leg(side: int, k: float, broad: float) -> Solid:
+    """The left (1) or right (-1) leg of flared trousers: half a disc at its hem, an ellipse from the shin up."""
+    outside = circle(1.0, 24)[:13]
+    inside = np.column_stack([np.linspace(-0.7, 0.7, 5), np.zeros(5)])
+    half = np.concatenate([outside, inside])
+    turn = np.concatenate([np.linspace(0, np.pi, 13), np.linspace(np.pi, 2 * np.pi, 7)[1:-1]])
+    full = np.column_stack([np.cos(turn), np.sin(turn)])
+    rings = []
+    for z, y, reach_x, reach_y, share in FLARE_LEVELS:
+        outline = (half + share * (full - half)) * (reach_x, reach_y) + (0.0, y - SLIT_M * (share == 0.0))
+        rings.append(np.column_stack([outline, np.full(len(outline), z)]))
+    hip = 0.085 * k * broad
+    rings.append(np.column_stack([full * 0.088 * broad + (0.0, hip), np.full(len(full), 0.72 * k)]))
+    left = loft(rings, "trousers")
+    return left if side > 0 else left.mirrored()
 
 
 def _arm(side: int, k: float, broad: float, swing: float, spread: float, bend: float, bare: bool) -> list[Solid]:
@@ -161,8 +176,8 @@ def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
     below = pick(rng, (denim, grey(rng, 0.06, 0.2), navy))
     hair = (grey(rng, 0.04, 0.18), hsv(0.07, 0.6, rng.uniform(0.2, 0.4)), hsv(0.12, 0.5, 0.75), grey(rng, 0.5, 0.8))
     return {
-        "top": plain(rng, coat) if variant == "coat" else cloth(rng, top),
-        "trousers": _long_clothes(rng, coat, below) if variant == "coat" else plain(rng, trousers),
+        **(_coat_cloths(rng, coat) if variant == "coat" else {"top": cloth(rng, top)}),
+        "trousers": plain(rng, below if variant == "coat" else trousers),
         "shoes": plain(rng, pick(rng, (grey(rng, 0.05, 0.3), hsv(0.06, 0.5, 0.3), grey(rng, 0.7, 0.95)))),
         "skin": plain(rng, skin, mottle=0.05),
         "hair": plain(rng, pick(rng, hair), mottle=0.25),
@@ -170,23 +185,19 @@ def paint(variant: str, rng: np.random.Generator) -> dict[str, Image]:
     }
 
 
-def _long_clothes(rng: np.random.Generator, coat: Colour, trousers: Colour) -> Image:
-    """A coat over wide trousers: folds, the coat's opening and buttons, and the dark gap between the legs."""
-    size_px = 128
-    u = (np.arange(size_px) + 0.5) / size_px
-    v = 1 - u
-    waves = np.sin(2 * np.pi * (int(rng.integers(7, 11)) * u + rng.random())) * (0.6 + 0.4 * noise(rng, 1, size_px)[0])
-    hem = rng.uniform(*COAT_HEM_V)
-    colour = np.where((v > hem)[:, None, None], coat, trousers)
-    depth = np.interp(v, [0.0, 0.15, 0.6, 1.0], [0.05, 0.25, 0.08, 0.05])
-    image = to_image(colour * (1 + depth[:, None] * waves[None, :])[..., None])
-    for middle in (0.0, 0.5, 1.0):
-        polygon(image, [(middle - 0.08, 0.0), (middle + 0.08, 0.0), (middle, CROTCH_V)], GAP)
-    rectangle(image, (0.0, hem), (1.0, hem + 0.012), 0.6 * coat)
-    rectangle(image, (0.0, hem), (0.012, 0.97), 0.5 * coat)
-    for height in (0.62, 0.70, 0.78):
-        ellipse(image, (0.03, height), (0.008, 0.008), 0.3 * coat)
-    return weathered(rng, image, 0.1)
+def _coat_cloths(rng: np.random.Generator, colour: Colour) -> dict[str, Image]:
+    """A coat's sleeves, and the picture around it with its opening in front: lapels over a shirt, and buttons."""
+    image, shirt = plain(rng, colour, 128), grey(rng, 0.6, 0.9)
+    # The front is where the picture begins and ends.
+    for front in (0.0, 1.0):
+        polygon(image, [(front, 0.72), (front - 0.07, 0.93), (front + 0.07, 0.93)], shirt)
+        for side in (1, -1):
+            lapel = [(0.0, 0.70), (0.045, 0.93), (0.10, 0.90), (0.085, 0.82)]
+            polygon(image, [(front + side * u, v) for u, v in lapel], 0.8 * colour)
+        stroke(image, [(front + 0.012, COAT_HEM_V), (front + 0.012, 0.70)], 0.012, 0.7 * colour)
+        for height in (0.45, 0.55, 0.65):
+            ellipse(image, (front + 0.03, height), (0.009, 0.009), 0.35 * colour)
+    return {"top": plain(rng, colour), "coat": image}
 
 
 VARIANTS = {name: Variant(SECTIONS[name], partial(shape, name), partial(paint, name)) for name in SECTIONS}
