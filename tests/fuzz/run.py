@@ -55,6 +55,7 @@ class Watched:
     def __init__(self, name: str, folder: Path, findings: Path) -> None:
         from tests.fuzz import targets  # noqa: PLC0415 - instrumented by then
 
+        targets.load()
         self._name, self._target, self._folder, self._findings = name, targets.TARGETS[name], folder, findings
         self._known = {path.name for path in findings.glob("*.bin")}
         self.calls = 0

@@ -194,6 +194,12 @@ def settings(data: bytes, folder: Path) -> None:
     _quietly((lambda: config.gather(path, [], None)) if kind == 2 else (lambda: read_extrinsics(path)))
 
 
+def load() -> None:
+    """Import what targets import late: among other work that takes longer than an input may."""
+    for name in config.usable_names():
+        config.declaration(name)
+
+
 TARGETS: dict[str, Callable[[bytes, Path], None]] = {
     one.__name__: one for one in (mcap, bag, db3, rosbag2, cdr, definitions, maps, databases, foxglove, settings)
 }

@@ -1,12 +1,13 @@
 """Definitions as ROS 1 bags really hold them: of odd text, without nested types, or empty."""
 
 import struct
+import time
 from pathlib import Path
 
 import pytest
 from mcap_landmarks.errors import MessageError
 from mcap_landmarks.sources import OmittedTopic, find_source
-from mcap_landmarks.sources._definition_text import decoded
+from mcap_landmarks.sources._definition_text import decoded, plain
 from mcap_landmarks.sources._ros1_types import converted
 from mcap_landmarks.sources.rosbag1 import Rosbag1Config
 from rosbags.rosbag1 import Writer
@@ -96,3 +97,17 @@ def test_a_message_without_fields_has_an_empty_definition() -> None:
 def test_a_type_that_holds_itself_is_refused() -> None:
     with pytest.raises(MessageError, match="my_msgs/msg/Loop holds itself"):
         converted("my_msgs/Loop", "my_msgs/Loop[] loops\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "is_kept"), [("A", True), ("A_1B", True), ("A__B", False), ("A_", False), ("AbC", False)]
+)
+def test_constants_are_kept_by_the_names_that_the_parser_takes(name: str, is_kept: bool) -> None:
+    assert (f"uint8 {name}=3" in plain(f"uint8 {name}=3\nuint8 x\n")) == is_kept
+
+
+def test_a_long_name_that_is_none_of_a_constant_takes_no_time() -> None:
+    """Found by fuzzing: of 60 capitals and digits before a sign each split was tried."""
+    began = time.process_time()
+    assert "x" in plain(f"uint8 L{'3' * 5000}?=3\nuint8 x\n")
+    assert time.process_time() - began < 1

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 _SEPARATOR = "=" * 80 + "\n"
 _SECTION = re.compile(r"MSG:\s*(\S+)")
-_CONSTANT = re.compile(r"[A-Z](?:_?[A-Z0-9]+)*")
+_CONSTANT = re.compile(r"[A-Z](?:_?[A-Z0-9])*")
 _NUMBER = re.compile(r"[+-]?(?:0[xX][0-9a-fA-F]+|0b[01]+|\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)")
 _EMPTY = frozenset({"", "*"})  # what publishers that do not know their type write
 
