@@ -11,6 +11,7 @@ from typing import Self
 from mcap_landmarks.api import log_tables
 from mcap_landmarks.api.arguments import AnyPath, Moment, moment_ns, pairs, place, tell
 from mcap_landmarks.api.logged_items import LoggedCloud, LoggedImage, LoggedScan
+from mcap_landmarks.api.parameter_names import naming_parameters
 from mcap_landmarks.channels import CAMERA_IMAGE, DETECTIONS, MATCH, ODOMETRY, SCAN, SCENE_OBJECTS, TRUTH_POSE
 from mcap_landmarks.errors import MessageError, RecordingError, UsageError
 from mcap_landmarks.evaluation.pose_topics import poses_in
@@ -37,6 +38,7 @@ from mcap_landmarks.wording import counted
 _Inputs = Mapping[Connection, Channel[Message]]
 
 
+@naming_parameters()
 def open_log(
     path: AnyPath,
     *,
@@ -132,6 +134,7 @@ class LogReader:
         found = self._messages(SCAN, topic)
         return (LoggedScan.of(log_ns, name, scan) for name, log_ns, scan in found if isinstance(scan, LaserScan))
 
+    @naming_parameters()
     def clouds(self, topic: str | None = None) -> Iterator[LoggedCloud]:
         """The point clouds of a LiDAR or depth camera, one by one; raises as `images`."""
         self._check_open()
@@ -142,6 +145,7 @@ class LogReader:
         found = self._messages(SCAN, topics[0])
         return (LoggedCloud.of(log_ns, name, cloud) for name, log_ns, cloud in found if isinstance(cloud, PointCloud2))
 
+    @naming_parameters()
     def odometry(self, topic: str | None = None) -> StructuredArray:
         """A row per message of odometry as it was recorded, in the plane, with the base's own velocity.
 
@@ -174,6 +178,7 @@ class LogReader:
         """A row per bundle: what came of localizing it, and which objects were matched; raises as `odometry`."""
         return log_tables.match_table(self._of(MATCH, topic))
 
+    @naming_parameters()
     def poses(self, topic: str | None = None, child: str | None = None) -> StructuredArray:
         """A row per pose in the plane, by its stamp: of what localize found, else of what `export` would take.
 
@@ -215,6 +220,7 @@ class LogReader:
         log = RecordedLog(self._recording, replace(self._span, choice=choice))
         return log.layered([Layer(self._recording, self._recording.channels)])
 
+    @naming_parameters()
     def _inputs(self, channel: Channel[Message], topic: str | None) -> tuple[LayeredLog, _Inputs]:
         """The connections that a channel is read from: those that the verbs would take, or those of a topic."""
         choice, role = self._span.choice, ROLES.get(channel)

@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import TypedDict, Unpack
 
 from mcap_landmarks.api.arguments import AnyPath, Moment, maybe_place, moment_text, pairs, place, places, tell, texts
+from mcap_landmarks.api.parameter_names import naming_parameters
 from mcap_landmarks.api.pose_errors import EvaluationResult
 from mcap_landmarks.atomic import check_target
 from mcap_landmarks.diff.comparison import Diff
@@ -56,6 +57,7 @@ class Options(TypedDict, total=False):
     lenient: bool
 
 
+@naming_parameters()
 def run(
     log: AnyPath,
     stages: str | Sequence[str],
@@ -74,6 +76,7 @@ def run(
     return _run("run", log, texts(stages), output, map_file, options)
 
 
+@naming_parameters()
 def localize(
     log: AnyPath, map_file: AnyPath, output: AnyPath, *, fixed: bool = False, **options: Unpack[Options]
 ) -> LogRun:
@@ -86,6 +89,7 @@ def localize(
     return _run("localize", log, ["localize"], output, map_file, asked, lacking=True)
 
 
+@naming_parameters()
 def build_map(
     logs: AnyPath | Sequence[AnyPath],
     map_file: AnyPath,
@@ -111,6 +115,7 @@ def build_map(
     return found
 
 
+@naming_parameters()
 def evaluate(
     result: AnyPath,
     *,
@@ -140,6 +145,7 @@ def evaluate(
     return EvaluationResult.of(found, aligned=align)
 
 
+@naming_parameters()
 def diff(
     baseline: AnyPath,
     candidate: AnyPath,
@@ -169,6 +175,7 @@ def diff(
     return found
 
 
+@naming_parameters()
 def diff_folders(
     baseline: AnyPath,
     candidate: AnyPath,
@@ -195,6 +202,7 @@ def diff_folders(
     )
 
 
+@naming_parameters()
 def diff_drives(
     baseline: AnyPath,
     candidate: AnyPath,

@@ -63,7 +63,9 @@ def logs_in(folder: Location) -> list[SetLog]:
         return [SetLog(log.name, fingerprint=log.fingerprint, blessed=log) for log in read_blessed(folder / BLESSED)]
     files = _below(folder, _SUFFIX)
     if not files:
-        raise UsageError(f"{folder}: holds neither logs (*{_SUFFIX}) nor {BLESSED}; name a folder of results")
+        maps = [str(path) for path in _below(folder, ".db").values()]
+        remedy = f"compare maps such as {maps[0]} one by one" if maps else "name a folder of results"
+        raise UsageError(f"{folder}: holds neither logs (*{_SUFFIX}) nor {BLESSED}; {remedy}")
     return [_listed(path, PurePosixPath(name).with_suffix("").as_posix()) for name, path in files.items()]
 
 
