@@ -160,7 +160,8 @@ def position_row(place: str, scores: Mapping[str, Any] | None) -> Row:
         return Row(name, float("nan"), "m RMSE", cases=0)
     position = scores["position"]
     peers: dict[str, float] = {
-        "localized": scores["localized"] / scores["bundles"],
+        "bundles": scores["bundles"],
+        "with two objects": scores["eligible"],
         "false": scores["false"]["count"],
         "median_m": position["median_m"],
         "p95_m": position["p95_m"],
