@@ -103,13 +103,13 @@ def _coat(k: float, broad: float) -> list[Solid]:
 def _flared_leg(side: int, k: float, broad: float) -> Solid:
     """The left (1) or right (-1) leg of flared trousers: half a disc at its hem, an ellipse from the shin up."""
     outside = circle(1.0, 24)[:13]
-    inside = np.column_stack([np.linspace(-0.7, 0.7, 5), np.zeros(5)])
+    inside = np.column_stack([np.linspace(-0.7, 0.7, 5), np.full(5, -SLIT_M / COAT_M)])
     half = np.concatenate([outside, inside])
     turn = np.concatenate([np.linspace(0, np.pi, 13), np.linspace(np.pi, 2 * np.pi, 7)[1:-1]])
     full = np.column_stack([np.cos(turn), np.sin(turn)])
     rings = []
     for z, y, reach_x, reach_y, share in FLARE_LEVELS:
-        outline = (half + share * (full - half)) * (reach_x, reach_y) + (0.0, y - SLIT_M * (share == 0.0))
+        outline = (half + share * (full - half)) * (reach_x, reach_y) + (0.0, y)
         rings.append(np.column_stack([outline, np.full(len(outline), z)]))
     hip = 0.085 * k * broad
     rings.append(np.column_stack([full * 0.088 * broad + (0.0, hip), np.full(len(full), 0.72 * k)]))
