@@ -117,3 +117,13 @@ def test_odds_are_asked_of_a_tracked_place_too() -> None:
     strict = SequenceLocalizer(matcher(world, LocalizeConfig(accidental=1e-12)), OdometryNoise(), 30.0)
     found = driven(strict, world, ahead(3), [range(5)] * 3)
     assert statuses(found) == [Status.AMBIGUOUS] * 3
+
+
+def test_scans_that_came_late_make_nothing_surer() -> None:
+    world, poses = one_place(), ahead(8)
+    localizer = sequence(world)
+    for i in (0, 3, 1, 2, 5, 4, 7, 6):
+        at = np.array([0.5 * i, 0.0, 0.0])
+        found = localizer.localize(seen(world, poses[i], range(5), stamp_ns=i), odometry(at, 0.5 * i))
+        assert np.linalg.eigvalsh(localizer._local_map.covariance).min() > 0
+        assert found.pose == pytest.approx(poses[i], abs=0.01)

@@ -83,7 +83,9 @@ class SequenceLocalizer:
             return
         step = se2.between(before.odom_from_base, odometry.odom_from_base)
         way_m = odometry.way_m - before.way_m
-        motion = Motions(step[None], np.array([way_m]), np.array([odometry.turned_rad - before.turned_rad]))
+        # A scan that came late is of before the last one: the way back to it is as uncertain as the way on.
+        turned_rad = odometry.turned_rad - before.turned_rad
+        motion = Motions(step[None], np.array([abs(way_m)]), np.array([abs(turned_rad)]))
         covariance = motion_covariance(motion, self._noise)[0]
         self._local_map.predict(step, covariance, way_m)
         self._relocalizer.predict(step)
