@@ -108,13 +108,15 @@ def tasks_in(folder: Path, logs: Sequence[Path]) -> list[Task]:
 def seconds_per_log(workers: Workers, tasks: Sequence[Task], count: int) -> tuple[float, float]:
     """The seconds until the first of `count` workers begins, and the seconds per log once each has had two logs."""
     began, starts, warm = time.perf_counter(), list[float](), 2 * count
-    run = workers.run(tasks, TaskLimits(), lambda _task, _pid: starts.append(time.perf_counter() - began))
+    run = workers.run(
+        tasks, TaskLimits(), lambda _task, _pid: starts.append(time.perf_counter() - began), lambda _: None
+    )
     ends = [time.perf_counter() for _ in run]
     return starts[0], (ends[-1] - ends[warm - 1]) / (len(ends) - warm)
 
 
 def _outputs(workers: Workers, logs: Sequence[Path], folder: Path) -> dict[str, bytes]:
-    ended = list(workers.run(tasks_in(folder, logs), TaskLimits(), lambda _task, _pid: None))
+    ended = list(workers.run(tasks_in(folder, logs), TaskLimits(), lambda _task, _pid: None, lambda _task: None))
     assert all(one.exit_code == 0 for one in ended), ended
     return _files(folder)
 
@@ -128,7 +130,7 @@ def _row(name: str, workers: Workers, logs: Sequence[Path], folder: Path, clean:
     began, into = time.perf_counter(), folder / name.replace(" ", "_")
     ended: list[Ended] = []
     with Killer(most=len(logs) // 2) as killer:
-        for one in workers.run(tasks_in(into, logs), TaskLimits(), killer.started):
+        for one in workers.run(tasks_in(into, logs), TaskLimits(), killer.started, lambda _task: None):
             killer.ended(one.task)
             ended.append(one)
             left = f"{len(logs) - len(ended)} left, {killer.killed} killed"

@@ -105,7 +105,7 @@ def _scheduling_row(count: int) -> Row:
     """What it costs to hand out tasks that do nothing."""
     tasks = [Task(Path(f"{number}.mcap"), Path(f"{number}.out"), ("nothing",)) for number in range(count)]
     began = time.perf_counter()
-    ended = list(LocalWorkers(WORKERS, nothing).run(tasks, TaskLimits(), lambda _task, _pid: None))
+    ended = list(LocalWorkers(WORKERS, nothing).run(tasks, TaskLimits(), lambda _task, _pid: None, lambda _task: None))
     seconds = time.perf_counter() - began
     if len(ended) != count or any(one.exit_code for one in ended):
         raise RuntimeError("not all tasks ended well")

@@ -45,8 +45,8 @@ Left out are two that take seconds and write as others do: explain's picture as 
 """
 AGAIN = {
     **dict.fromkeys(("convert to a bag", "convert in parts", "detect", "diff, blessing", "localize", "plot"), True),
-    **dict.fromkeys(("export", "foxglove"), True),
-    **dict.fromkeys(("diff", "evaluate", "export with images", "landmarks import"), False),
+    **dict.fromkeys(("export", "export with images", "foxglove"), True),
+    **dict.fromkeys(("diff", "evaluate", "landmarks import"), False),
 }
 """Whether what some of them write tells what it was made of or stays as it is, and so needs no --overwrite."""
 

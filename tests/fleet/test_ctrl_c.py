@@ -44,6 +44,6 @@ def test_sigint_is_blocked_when_a_worker_is_spawned(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(resource_tracker, "ensure_running", tracker.ensure_running)
     monkeypatch.setattr(local_workers, "ProcessPool", PoolThatSpawns)
     task = Task(Path("a.mcap"), Path("x"), ("tiny", "x"))
-    assert len(list(LocalWorkers(1, toy).run([task], TaskLimits(), lambda _task, _pid: None))) == 1
+    assert len(list(LocalWorkers(1, toy).run([task], TaskLimits(), lambda _task, _pid: None, lambda _task: None))) == 1
     assert signal.SIGINT in PoolThatSpawns.blocked
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])

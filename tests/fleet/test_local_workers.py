@@ -104,7 +104,7 @@ from mcap_landmarks.fleet.tasks import Task, TaskLimits
 from tests.fleet.toy_command import toy
 if __name__ == "__main__":
     task = Task(Path("a.mcap"), Path(sys.argv[1]), ("hang", sys.argv[1]))
-    list(LocalWorkers(1, toy).run([task], TaskLimits(), lambda _task, pid: print(pid, flush=True)))
+    list(LocalWorkers(1, toy).run([task], TaskLimits(), lambda _task, pid: print(pid, flush=True), print))
 """
 
 

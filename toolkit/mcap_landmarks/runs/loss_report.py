@@ -62,20 +62,25 @@ def lost_by_cause(damage: Damage, counted: Mapping[str, int | None]) -> dict[str
 
     What else is missing of those that are expected goes to the one cause that says no number, if it is one.
     """
-    found = dict(counted)
-    if damage.suspect_chunks:
-        held = [chunk.messages for chunk in damage.suspect_chunks]
-        known = [messages for messages in held if messages is not None]
-        found["damaged_chunks"] = sum(known) if known else None
-    if damage.resyncs and not damage.is_whole:
-        found["passed_over"] = None
-    if damage.cut:
-        found["cut"] = None
-    rest = (damage.expected or 0) - damage.recovered - sum(messages or 0 for messages in found.values())
+    found = {**counted, **_seen(damage)}
+    rest = (damage.expected or 0) - damage.recovered - sum(filter(None, found.values()))
     if rest > 0:
         unknown = [cause for cause, messages in found.items() if messages is None]
         found[unknown[0] if len(unknown) == 1 else "missing"] = rest
     return {cause: found[cause] for cause in _WORDS if cause in found}
+
+
+def _seen(damage: Damage) -> dict[str, int | None]:
+    """The causes that show in the bytes of a file, with the messages that damaged chunks declare."""
+    found: dict[str, int | None] = {}
+    if damage.suspect_chunks:
+        held = [chunk.messages for chunk in damage.suspect_chunks if chunk.messages is not None]
+        found["damaged_chunks"] = sum(held) if held else None
+    if damage.resyncs and not damage.is_whole:
+        found["passed_over"] = None
+    if damage.cut:
+        found["cut"] = None
+    return found
 
 
 def told_causes(lost: Mapping[str, int | None]) -> str:
