@@ -35,6 +35,12 @@ def test_a_file_url_is_a_path() -> None:
         location("file://host/a")
 
 
+@pytest.mark.parametrize("text", ["http://[::1/log.mcap", "s3://a]b/log.mcap", "file://[a/log.mcap"])
+def test_a_host_that_nothing_can_have_is_refused_at_once(text: str) -> None:
+    with pytest.raises(UsageError, match=r"log\.mcap is no URL \(.+\); check its host"):
+        location(text)
+
+
 @pytest.mark.parametrize("text", ["s3://bucket/out", "s3://bucket/out/"])
 def test_names_in_a_folder_and_beside_a_file(text: str) -> None:
     assert location(text) / "a.mcap" == Url("s3://bucket/out/a.mcap")

@@ -100,14 +100,19 @@ def location(text: str | Path) -> Location:
     What `file://` names is a path, too (RFC 8089).
 
     Raises:
-        UsageError: a file of another host, or it has a password.
+        UsageError: a file of another host, or it has a password, or a host that nothing can have.
     """
     if not isinstance(text, str) or not URL.match(text):
         return Path(text)
-    if scheme_of(text) != "file":
+    is_file = scheme_of(text) == "file"
+    if not is_file:
         check_no_password(text)
+    try:
+        parts = urlsplit(text)
+    except ValueError as error:
+        raise UsageError(f"{shown(text)} is no URL ({error}); check its host") from error
+    if not is_file:
         return Url(text)
-    parts = urlsplit(text)
     if parts.netloc not in {"", "localhost"}:
         raise UsageError(f"{shown(text)} is a file of another host; write file:///PATH, or the URL of a server")
     return Path(unquote(parts.path))
