@@ -96,7 +96,7 @@ def _damaged_frames(database: sqlite3.Connection) -> None:
     ("damage", "mode", "lost", "expected"),
     [
         (_without_payload, None, {"unsound_rows": 3}, 40),
-        (_undescribed, None, {"without_topic": 2}, None),
+        (_undescribed, None, {"without_topic": 2}, 40),
         (_damaged_frames, "message", {"not_decompressed": 2}, 40),
     ],
 )
@@ -131,6 +131,38 @@ def test_rows_in_damaged_pages_are_counted(tmp_path: Path, capsys: pytest.Captur
     source.write_bytes(data)
     document = _recover(source, capsys)
     assert document["lost"] == {"unreadable_rows": 3000 - document["recovered"]}  # type: ignore[operator]
+    assert document["expected"] == 3000
+
+
+def test_how_many_rows_a_cut_file_lacks_nothing_tells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = write_plain_db3(tmp_path / "a.db3", count=3000, index=False)
+    data = bytearray(source.read_bytes())
+    size = int.from_bytes(data[16:18], "big")
+    leaves = [at for at in range(size, len(data), size) if data[at] == 0x0D]
+    data[leaves[len(leaves) // 3] : leaves[len(leaves) // 3] + size] = bytes(size)
+    source.write_bytes(data[: leaves[len(leaves) // 2]])
+    document = _recover(source, capsys)
+    assert (document["expected"], document["lost"]) == (None, {"unreadable_rows": None})
+
+
+def test_a_bag_of_recordings_tells_as_they_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = tmp_path / "bag"
+    source = write_ros1(tmp_path / "a.bag")
+    assert call("convert", source, "-o", bag, "--to", "rosbag2", "--split-count", 30, "--chunk-size", "1K") == 0
+    capsys.readouterr()
+    first, second, _ = sorted(bag.glob("*.mcap"))
+    data = bytearray(first.read_bytes())
+    with first.open("rb") as stream:
+        place = make_reader(stream).get_summary().chunk_indexes[1].chunk_start_offset  # type: ignore[union-attr]
+    data[place + 80 : place + 90] = bytes(10)
+    first.write_bytes(data)
+    document = _recover(bag, capsys)
+    lost = document["lost"]["damaged_chunks"]  # type: ignore[index]
+    assert (document["expected"], document["recovered"]) == (80, 80 - lost)
+    second.unlink()
+    document = _recover(bag, capsys)
+    assert document["lost"] == {"damaged_chunks": lost, "missing": None}
+    assert document["expected"] is None
 
 
 def test_a_topic_that_nobody_understands_is_a_cause(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

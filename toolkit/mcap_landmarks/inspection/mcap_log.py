@@ -16,6 +16,8 @@ from mcap_landmarks.recording.summary_index import Block
 from mcap_landmarks.recording.writer import RecordingWriter
 from mcap_landmarks.sources import (
     Carried,
+    LossAccount,
+    LostStretch,
     McapFile,
     OmittedTopic,
     Payload,
@@ -36,7 +38,7 @@ class McapLog:
     def __init__(self, file: McapFile) -> None:
         self._file = file
         with open_recording(file.path) as recording:
-            self.index = recording.index
+            self.index, self._damage, self._misfits = recording.index, recording.damage, 0
             self.profile, self.metadata = recording.profile, recording.metadata
             self.metadata_records = recording.metadata_records
             self.start_ns, self.end_ns = recording.start_ns, recording.end_ns
@@ -53,6 +55,23 @@ class McapLog:
         """See `Log`."""
         pairs = zip(self._carried, self.recorded, strict=True)
         return [ChannelSummary(carried.connection, entry.count) for carried, entry in pairs if carried]
+
+    @property
+    def account(self) -> LossAccount:
+        """See `Accounted`."""
+        damage, found = self._damage, LossAccount()
+        found.chunks = {chunk.offset: (chunk.messages, chunk.reason) for chunk in damage.suspect_chunks}
+        if not damage.is_whole:
+            found.passed_over = [LostStretch(one.start, one.end, one.reason) for one in damage.resyncs]
+        if damage.cut:
+            found.add("cut", None)
+        if self._misfits:
+            found.add("not_fitting", self._misfits)
+        if damage.expected is None:
+            found.is_open = bool(damage.losses)
+        else:
+            found.undeclared = max(damage.expected - sum(entry.count for entry in self.recorded), 0)
+        return found
 
     def mounts(self) -> list["MountLog"]:
         """Where sensors are, of which only their messages tell."""
@@ -173,6 +192,7 @@ class McapLog:
         try:
             data = carried.convert(raw.data)
         except MessageError as error:
+            self._misfits += 1
             self._lose(f"{carried.connection.topic}: {error}; such messages are left out")
             return None
         return RawMessage(carried.connection, raw.log_time_ns, raw.publish_time_ns, raw.sequence, data)
@@ -188,6 +208,7 @@ class McapLog:
         """The file; what of it cannot be read is told at the end."""
         with open_recording(self._file.path, known=self.index) as recording:
             yield recording
+            self._damage = recording.damage
             for loss in recording.losses:
                 self._lose(loss)
 

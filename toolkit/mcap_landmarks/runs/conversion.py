@@ -52,7 +52,8 @@ class Converted:
     def damage(self) -> Damage:
         """The account in the terms of a recording's; what is damaged may not say how many messages it should hold."""
         losses = self.told_losses()
-        expected = None if losses and not self.lost else self.declared + self.account.undeclared
+        is_counted = not self.account.is_open and bool(self.lost or self.account.undeclared)
+        expected = self.declared + self.account.undeclared if is_counted or not losses else None
         return damage_of(self.account, expected, self.topics.total(), losses)
 
     def lost_by_cause(self) -> dict[str, int | None]:
@@ -186,7 +187,7 @@ class Job:
             done.dropped.update(log.dropped)
             done.notes += log.notes
         done.notes += [note for part in self.inputs.parts for note in notes_of(part)]
-        done.account = account_of(self.inputs.parts)
+        done.account = account_of(self.inputs.parts, lacks_files=any(log.losses for log in self.inputs.logs))
         done.losses, done.left_out = self.inputs.losses, self.inputs.left_out
         if self.inputs.selection.is_cut:
             if missing:

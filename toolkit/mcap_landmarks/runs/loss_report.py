@@ -29,12 +29,17 @@ def loss_report(report: Mapping[str, object]) -> dict[str, str]:
     return {name: entry_text(value) for name, value in report.items()}
 
 
-def account_of(parts: Iterable[object]) -> LossAccount:
-    """What the parts of a log that count their losses lost together: of several files without the places in them."""
+def account_of(parts: Iterable[object], *, lacks_files: bool = False) -> LossAccount:
+    """What the parts of a log that count their losses lost together: of several files without the places in them.
+
+    `lacks_files`: files of the log are not among the parts.
+    """
     accounts = [part.account for part in parts if isinstance(part, Accounted)]
-    if len(accounts) == 1:
+    if len(accounts) == 1 and not lacks_files:
         return accounts[0]
-    found = LossAccount()
+    found = LossAccount(is_open=lacks_files or any(one.is_open for one in accounts))
+    if lacks_files:
+        found.add("missing", None)
     for one in accounts:
         for cause, messages in one.messages.items():
             found.add(cause, messages)

@@ -7,7 +7,7 @@ from mcap_landmarks.extensions import Registry
 from mcap_landmarks.sources._bag_metadata import recorded_metadata
 from mcap_landmarks.sources._definition_files import definition_files
 from mcap_landmarks.sources._foxglove_types import counterpart
-from mcap_landmarks.sources._loss_account import Accounted, LossAccount
+from mcap_landmarks.sources._loss_account import Accounted, LossAccount, LostStretch
 from mcap_landmarks.sources._merge import Piece, merge
 from mcap_landmarks.sources._ros1_back import Ros1Type, ros1_type
 from mcap_landmarks.sources._shape import (
@@ -68,6 +68,7 @@ __all__ = [
     "Carried",
     "Log",
     "LossAccount",
+    "LostStretch",
     "McapFile",
     "OmittedTopic",
     "Payload",

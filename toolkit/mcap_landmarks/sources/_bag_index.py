@@ -105,13 +105,14 @@ def _by_scanning(stream: BinaryIO, size: int, offset: int) -> BagIndex:
         try:
             offset = _scan_record(stream, size, offset, index)
         except DamagedBagError as error:
+            index.account.is_open = True
             search = offset if index.damaged_at is None else index.damaged_at
             found = next_record(stream, size, search + 1)
             if found is None:
                 index.losses.append(f"at byte {offset} of {size}: {error}; what follows is lost")
                 index.account.add("cut", None)
                 return index
-            begin = min(offset, found)
+            begin = offset if found >= offset else search
             index.losses.append(f"{found - begin} bytes passed over from byte {begin} to byte {found} ({error})")
             index.account.passed_over.append(LostStretch(begin, found, str(error)))
             index.damaged_at = None
@@ -119,6 +120,7 @@ def _by_scanning(stream: BinaryIO, size: int, offset: int) -> BagIndex:
     if offset > size:
         index.losses.append(f"the file is cut at byte {size}, within a chunk; what follows is lost")
         index.account.add("cut", None)
+        index.account.is_open = True
     return index
 
 

@@ -163,13 +163,15 @@ class Db3Log:
             self._damaged(error)
             counts.clear()
             times = array("q")
-            gaps: list[int] = []
+            gaps: list[int | None] = []
             for time_ns, _, topic in salvaged_rows(database, gaps.append):
                 counts[topic] += 1
                 times.append(time_ns)
-            if gaps:
-                self.account.add("unreadable_rows", sum(gaps), is_declared=False)
-                self._lose(f"{counted(sum(gaps), 'row')} between readable ones cannot be read")
+            self.account.is_open = None in gaps
+            if missing := sum(gap or 0 for gap in gaps):
+                if not self.account.is_open:
+                    self.account.add("unreadable_rows", missing, is_declared=False)
+                self._lose(f"{counted(missing, 'row')} between readable ones cannot be read")
             self.start_ns, self.end_ns = min(times, default=None), max(times, default=None)
         return counts
 

@@ -10,11 +10,11 @@ _MOST_GAPS = 1000
 _ROWS = "SELECT timestamp, rowid, topic_id FROM messages WHERE rowid > ? ORDER BY rowid"
 
 
-def salvaged_rows(database: sqlite3.Connection, lost: Callable[[int], None]) -> Iterator[tuple[int, int, int]]:
+def salvaged_rows(database: sqlite3.Connection, lost: Callable[[int | None], None]) -> Iterator[tuple[int, int, int]]:
     """Time, row id and topic of the rows that can be read, by row id.
 
     A row that lies in a damaged page is passed over with all its neighbours there; `lost` is told how many row ids are
-    missing each time (rosbag2 numbers rows one by one).
+    missing each time (rosbag2 numbers rows one by one), or None where nothing behind them can be read.
     """
     after: int | None = 0
     for _ in range(_MOST_GAPS):
@@ -33,8 +33,7 @@ def salvaged_rows(database: sqlite3.Connection, lost: Callable[[int], None]) -> 
         except sqlite3.DatabaseError:
             pass
         after = _behind(database, last)
-        if after is not None:
-            lost(after - last)
+        lost(None if after is None else after - last)
 
 
 def _behind(database: sqlite3.Connection, last: int) -> int | None:

@@ -18,13 +18,14 @@ class LossAccount:
 
     `messages` are lost by cause, None where nothing tells how many; `undeclared` of them are not among those that the
     storage declares for a topic. `chunks` are damaged, by their place: how many of their messages are lost, None
-    likewise, and why.
+    likewise, and why. `is_open`: more may be lost than is counted, and nothing tells how many messages there were.
     """
 
     messages: dict[str, int | None] = field(default_factory=dict)
     undeclared: int = 0
     chunks: dict[int, tuple[int | None, str]] = field(default_factory=dict)
     passed_over: list[LostStretch] = field(default_factory=list)
+    is_open: bool = False
 
     def add(self, cause: str, messages: int | None = 1, *, is_declared: bool = True) -> None:
         """Count messages that are lost for a cause; None is kept only where no number comes."""
@@ -38,4 +39,6 @@ class LossAccount:
 class Accounted(Protocol):
     """A part of a log that has such an account."""
 
-    account: LossAccount
+    @property
+    def account(self) -> LossAccount:
+        """What is lost so far."""
