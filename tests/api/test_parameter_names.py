@@ -25,6 +25,7 @@ from mcap_landmarks.resources import resource
             'needs a map; give map_file=FILE or settings={"localize.map": FILE}',
         ),
         ("the topic as it with --remap TOPIC=/camera_info", 'the topic as it with remap={"TOPIC": /camera_info}'),
+        ("--set sigma_m=0.1: write STAGE.KEY", 'settings={"sigma_m": 0.1}: write STAGE.KEY'),
         ("replace it with --overwrite", "replace it with overwrite=True"),
         ("give one with --model FILE.onnx, such as", "give one with model=FILE.onnx, such as"),
         ("allow it with --max-memory", "allow it with --max-memory"),

@@ -15,7 +15,7 @@ _VALUES = (
 )  # fmt: skip
 _OTHER_NAMES = {"map": "map_file", "slice": "heights"}
 _OPTION = re.compile(r"--([a-z]+(?:-[a-z]+)*)(?: ([A-Z][A-Z.:_]*(?:\.onnx)?\b))?")
-_PAIR = re.compile(rf"--({'|'.join(_PAIRS)}) ([^\s=]+)=([^\s,;)]+)")
+_PAIR = re.compile(rf"--({'|'.join(_PAIRS)}) ([^\s=]+)=([^\s,;)]*[^\s,;):])")
 
 
 def reworded(text: str) -> str:
