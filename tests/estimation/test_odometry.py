@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, dead_reckoning, motion_covariance
+from mcap_landmarks.estimation.odometry import Motions, OdometryNoise, dead_reckoning, motion_covariance, random_walk
 from mcap_landmarks.geometry import se2
 
 from tests.estimation.worlds import Array, nees
@@ -85,3 +85,25 @@ def test_dead_reckoning_composes_the_motions() -> None:
         expected.append(se2.compose(expected[-1], step))
     np.testing.assert_allclose(se2.between(np.array(expected), poses), 0, atol=1e-12)
     assert poses[2, 2] == pytest.approx(5.4 - 2 * np.pi)
+
+
+def test_a_walk_is_told_from_driving_however_odometry_is_timed() -> None:
+    """The steps' own variance, of a robot that speeds up and turns meanwhile; 3000 steps tell it to 5 %."""
+    rng = np.random.default_rng(0)
+    stamps_ns = np.cumsum(rng.integers(20, 40, 3001)) * 10**6
+    steps_s, times_s = np.diff(stamps_ns) / 1e9, stamps_ns[1:] / 1e9
+    driven = np.column_stack([1 + np.sin(times_s), np.zeros(3000), np.cos(times_s)]) * steps_s[:, None]
+    root = np.array([[0.04, 0.0, 0.0], [0.0, 0.0, 0.0], [0.01, 0.0, 0.02]])
+    slipped = driven + np.sqrt(steps_s)[:, None] * (rng.normal(size=(3000, 3)) @ root.T)
+    smooth, jagged = (dead_reckoned(steps) for steps in (driven, slipped))
+    np.testing.assert_allclose(random_walk(stamps_ns, jagged), root @ root.T, atol=0.05 * 0.04**2)
+    assert np.trace(random_walk(stamps_ns, smooth)) < 1e-3 * np.trace(root @ root.T)
+    assert not random_walk(stamps_ns[:3], jagged[:3]).any()
+
+
+def dead_reckoned(steps: Array) -> Array:
+    """The poses (N + 1, 3) that N twists (N, 3) lead to."""
+    poses = [np.zeros(3)]
+    for step in steps:
+        poses.append(se2.compose(poses[-1], se2.exp(step)))
+    return np.array(poses)

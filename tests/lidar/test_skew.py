@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from mcap_landmarks.lidar.config import ClusterConfig
-from mcap_landmarks.lidar.skew import is_timed, offsets_s, skew_covariances, unsure_motion
+from mcap_landmarks.lidar.skew import is_timed, motion_left, offsets_s, skew_covariances, unsure_motion
 from mcap_landmarks.messages.points import PointCloud2
 from mcap_landmarks.messages.scan import LaserScan
 
@@ -36,12 +36,29 @@ def test_without_times_a_beam_is_as_late_as_the_whole_scan() -> None:
 
 
 def test_driving_costs_ahead_and_turning_costs_across() -> None:
-    driven = skew_covariances(PLACES, np.full(4, 0.1), np.diag([0.25, 0.0, 0.0]))
+    driven = skew_covariances(PLACES, np.full(4, 0.1), np.diag([0.25, 0.0, 0.0]), np.zeros((3, 3)))
     np.testing.assert_allclose(driven, np.tile(np.diag([0.0025, 0.0]), (4, 1, 1)))
-    turned = skew_covariances(PLACES, np.full(4, 0.1), np.diag([0.0, 0.0, 1.0]))
+    turned = skew_covariances(PLACES, np.full(4, 0.1), np.diag([0.0, 0.0, 1.0]), np.zeros((3, 3)))
     np.testing.assert_allclose(turned[0], np.diag([0.0, 0.09]))
     np.testing.assert_allclose(turned[1], np.diag([0.04, 0.0]))
-    np.testing.assert_allclose(skew_covariances(PLACES, np.zeros(4), np.eye(3)), 0.0)
+    np.testing.assert_allclose(skew_covariances(PLACES, np.zeros(4), np.eye(3), np.eye(3)), 0.0)
+
+
+def test_wheels_that_slip_cost_as_their_walk_grows() -> None:
+    slipped = skew_covariances(PLACES, np.array([0.1, 0.2, -0.1, 0.0]), np.zeros((3, 3)), np.diag([0.01, 0.0, 0.04]))
+    expected = [np.diag([0.001, 0.036]), np.diag([0.034, 0.0]), np.diag([0.001, 0.064]), np.zeros((2, 2))]
+    np.testing.assert_allclose(slipped, expected, atol=1e-15)
+
+
+def test_what_is_left_of_the_motion_depends_on_what_tells_it() -> None:
+    velocity, walk, config, none = np.array([0.3, 0.0, 1.0]), np.eye(3), ClusterConfig(), np.zeros((3, 3))
+    untimed = scan(increment_s=0.0)
+    for message, known, expected in [
+        (scan(), velocity, (none, walk)),
+        (untimed, velocity, (np.outer(velocity, velocity), none)),
+        (scan(), None, (unsure_motion(config), none)),
+    ]:
+        np.testing.assert_array_equal(motion_left(message, known, walk, config), expected)
 
 
 def test_what_is_assumed_of_the_robot_can_be_set() -> None:

@@ -142,16 +142,19 @@ def drive(
     turn_s: float = 0.2,
     stamped_s: float | None = None,
     is_stamped: bool = True,
+    slip: Array | None = None,
 ) -> list[Bundle]:
     """Scans of a robot that drives and turns, each beam at its time, associated with odometry.
 
-    With `stamped_s` they are clouds, stamped so long after the first of their points.
+    With `stamped_s` they are clouds, stamped so long after the first of their points. `slip` (3,) are standard
+    deviations of each step of odometry.
     """
     rate = 30
-    driven, frames = [], ("odom", "base_footprint")
+    driven, frames, pose = [], ("odom", "base_footprint"), np.zeros(3)
     for i in range(rate * (count + 2)):
         at = SECOND + i * SECOND // rate
-        driven.append((at, Odometry.planar(at, frames, exp(velocity * i / rate), np.zeros((3, 3)))))
+        driven.append((at, Odometry.planar(at, frames, pose, np.zeros((3, 3)))))
+        pose = compose(pose, exp(velocity / rate + (0.0 if slip is None else slip * rng.normal(size=3))))
     messages: list[tuple[Channel[Message], int, Message]] = []
     for k in range(count):
         start = SECOND + SECOND // 3 + k * SECOND
@@ -184,6 +187,20 @@ def test_motion_under_a_scan_or_cloud_is_taken_out(stamped_s: float | None) -> N
         truth = transform_points(compose(exp(-velocity * (one.stamp_ns - SECOND) / 1e9), np.zeros(3)), [3.0, 0.6])
         np.testing.assert_allclose(transform_points(pose, truth), [3.0, 0.6], atol=1e-9)
         np.testing.assert_allclose(places(found, "fire hydrant")[0], truth, atol=0.03)
+
+
+def test_wheels_that_slip_make_objects_less_sure() -> None:
+    """Of 20 scans: squared errors over their variances, two of which add up to 2 where covariances are honest."""
+    velocity, apart = np.array([0.02, 0.0, 0.0]), []
+    for one in drive(velocity, 20, np.random.default_rng(3), slip=np.array([0.005, 0.0, 0.01])):
+        (found,) = results([one])
+        shares = [max((s for n, s in options if n == "suitcase"), default=0.0) for options in found.hypotheses]
+        best = int(np.argmax(shares))
+        row = [n for n, _ in found.hypotheses[best]].index("suitcase")
+        truth = transform_points(exp(-velocity * (one.stamp_ns - SECOND) / 1e9), [2.5, -1.0])
+        off = found.positions_xy[best][row] - truth
+        apart.append(off @ np.linalg.inv(found.covariances[best][row]) @ off)
+    assert np.mean(apart) < 4.0  # 405 if slip does not count
 
 
 def test_a_scan_without_a_stamp_was_logged_after_its_turn() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcap_landmarks.geometry.angles import wrap
+from mcap_landmarks.geometry.se2 import between, log
 
 Array = NDArray[np.float64]
 
@@ -55,6 +56,24 @@ def motion_covariance(motions: Motions, noise: OdometryNoise) -> Array:
     out[:, :2, 2] = out[:, 2, :2] = (heading / 2)[:, None] * across
     out[:, 2, 2] = heading
     return out
+
+
+def random_walk(stamps_ns: NDArray[np.int64], odom_from_base: Array) -> Array:
+    """How odometry jumps about between its messages: covariance (3, 3) of its twists in a second, in m^2, m rad, rad^2.
+
+    `odom_from_base` (K, 3) are the poses at K rising stamps (K,). A robot's velocity changes evenly over three steps;
+    what second differences of the velocities leave of them is taken for noise that is new in each step. Of fewer than
+    four poses nothing is known, and it is zero.
+    """
+    if len(stamps_ns) < 4:
+        return np.zeros((3, 3))
+    steps_s = np.diff(stamps_ns) / 1e9
+    velocities = log(between(odom_from_base[:-1], odom_from_base[1:])) / steps_s[:, None]
+    bent = velocities[2:] - 2 * velocities[1:-1] + velocities[:-2]
+    # A walk of variance q in a second makes the mean velocity over t vary by q / t.
+    bent /= np.sqrt(1 / steps_s[2:] + 4 / steps_s[1:-1] + 1 / steps_s[:-2])[:, None]
+    found: Array = bent.T @ bent / len(bent)
+    return found
 
 
 def dead_reckoning(start: Array, motions: Motions) -> Array:

@@ -1,7 +1,8 @@
-"""What it can cost that a scan could not be de-skewed: how unsure its objects are for that.
+"""What it can cost that a scan could not be de-skewed, or only as well as odometry is: how unsure objects are for that.
 
 A beam at a time t after the moment that is asked for shows things from where the base is then: an error of t times the
-velocity, and of t times the turn rate across the line to the thing.
+velocity, and of t times the turn rate across the line to the thing. Where odometry tells the motion but its wheels
+slip, a walk is left of it, whose square grows with t.
 """
 
 import numpy as np
@@ -19,17 +20,31 @@ def unsure_motion(config: ClusterConfig) -> Array:
     return np.diag([speed, speed, turn])
 
 
-def skew_covariances(places_xy: Array, offsets_s: Array, motion: Array) -> Array:
+def motion_left(
+    message: LaserScan | PointCloud2, velocity: Array | None, walk: Array, config: ClusterConfig
+) -> tuple[Array, Array]:
+    """What is left of the base's motion in a scan: mean squares (3, 3) of a velocity, and of a walk in a second.
+
+    `velocity` (3,) is what odometry tells, none without it, and `walk` (3, 3) how it errs, which de-skewing leaves.
+    """
+    none = np.zeros((3, 3))
+    if velocity is None:
+        return unsure_motion(config), none
+    return (none, walk) if is_timed(message) else (np.outer(velocity, velocity), none)
+
+
+def skew_covariances(places_xy: Array, offsets_s: Array, motion: Array, walk: Array) -> Array:
     """What is to be added to the covariances of N objects: (N, 2, 2) in m^2.
 
     They stand at places (N, 2) in the base frame and were measured within `offsets_s` (N,) of the moment that is asked
-    for, while the base moved at a velocity of mean squares `motion` (3, 3).
+    for, while the base moved at a velocity of mean squares `motion` (3, 3) and at random by `walk` (3, 3) a second.
     """
     slopes = np.zeros((len(places_xy), 2, 3))
     slopes[:, 0, 0] = slopes[:, 1, 1] = 1.0
     slopes[:, 0, 2], slopes[:, 1, 2] = -places_xy[:, 1], places_xy[:, 0]
-    spread: Array = slopes @ motion @ slopes.transpose(0, 2, 1)
-    return offsets_s[:, None, None] ** 2 * spread
+    times = np.abs(offsets_s)[:, None, None]
+    spread: Array = slopes @ (times**2 * motion + times * walk) @ slopes.transpose(0, 2, 1)
+    return spread
 
 
 def is_timed(message: LaserScan | PointCloud2) -> bool:

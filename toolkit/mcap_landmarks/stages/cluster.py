@@ -17,6 +17,7 @@ from mcap_landmarks.channels import (
     TF_STATIC,
 )
 from mcap_landmarks.errors import RecordingError, UsageError
+from mcap_landmarks.estimation.odometry import random_walk
 from mcap_landmarks.geometry import frames
 from mcap_landmarks.geometry.se2 import Array
 from mcap_landmarks.lidar import thesis
@@ -27,7 +28,7 @@ from mcap_landmarks.lidar.object_tracks import PieceChange, Tracks
 from mcap_landmarks.lidar.objects import Hypotheses
 from mcap_landmarks.lidar.range_noise import with_noise
 from mcap_landmarks.lidar.scan_beams import beams_of, check_level, returns_nothing
-from mcap_landmarks.lidar.skew import is_timed, offsets_s, skew_covariances, unsure_motion
+from mcap_landmarks.lidar.skew import motion_left, offsets_s, skew_covariances
 from mcap_landmarks.lidar.whole_clouds import CloudObject, WholeCloud, points_in_base, whole_cloud
 from mcap_landmarks.locations import Location
 from mcap_landmarks.messages.boxes import Boxes
@@ -182,33 +183,32 @@ def _beams(bundle: Bundle, base: str, mounting: Mounting, config: ClusterConfig)
 def _unsure(
     bundle: Bundle, base: str, mounting: Mounting, config: ClusterConfig, found: list[Hypotheses]
 ) -> tuple[list[Hypotheses], bool]:
-    """The objects of a bundle's scans, as unsure as these are skewed, and whether they are more than ranges are."""
-    skewed, motion = _skewed(bundle, config)
-    if not (skewed and motion.any() and found):
+    """The objects of a bundle's scans, as unsure as these are skewed, and whether that is more than ranges are where
+    they could not be de-skewed."""
+    scans = [one for one in (_measured(bundle, channel) for channel in (SCAN, SECOND_SCAN)) if one is not None]
+    left = [motion_left(one, *_odometry(bundle), config) for one in scans]
+    if not (found and np.any(left)):
         return found, False
     places = np.concatenate([one.positions_xy for one in found])
-    of_each = [
-        skew_covariances(
-            places, offsets_s(one, bundle.stamp_ns, mounting.lookup(bundle, base, one.frame_id), places), motion
-        )
-        for one in skewed
-    ]
+    of_each = []
+    for scan, (motion, walk) in zip(scans, left, strict=True):
+        times_s = offsets_s(scan, bundle.stamp_ns, mounting.lookup(bundle, base, scan.frame_id), places)
+        of_each.append(skew_covariances(places, times_s, motion, walk))
     # Two LiDARs show a thing at two times; the one that costs more counts.
     costs = np.trace(np.array(of_each), axis1=2, axis2=3)
     added = np.take_along_axis(np.array(of_each), costs.argmax(axis=0)[None, :, None, None], axis=0)[0]
     parts = np.split(added, np.cumsum([len(one.positions_xy) for one in found])[:-1])
     unsure = [replace(one, covariances=one.covariances + part) for one, part in zip(found, parts, strict=True)]
-    return unsure, bool(costs.max() > config.sigma_m**2)
+    skewed = costs[[motion.any() for motion, _ in left]]
+    return unsure, bool(skewed.max(initial=0.0) > config.sigma_m**2)
 
 
-def _skewed(bundle: Bundle, config: ClusterConfig) -> tuple[list[LaserScan | PointCloud2], Array]:
-    """The scans of a bundle that are not de-skewed, and the mean squares (3, 3) of the base's velocity meanwhile."""
-    found = [_measured(bundle, channel) for channel in (SCAN, SECOND_SCAN)]
-    scans = [message for message in found if message is not None]
-    if bundle.odometry is None:
-        return scans, unsure_motion(config)
-    velocity = bundle.odometry.velocity
-    return [message for message in scans if not is_timed(message)], np.outer(velocity, velocity)
+def _odometry(bundle: Bundle) -> tuple[Array | None, Array]:
+    """The base's velocity (3,) at a bundle's stamp, and how odometry walks (3, 3) while its scan is measured."""
+    odometry = bundle.odometry
+    samples = None if odometry is None else odometry.samples
+    walk = np.zeros((3, 3)) if samples is None else random_walk(samples.stamps_ns, samples.odom_from_base)
+    return None if odometry is None else odometry.velocity, walk
 
 
 def _without_returns(bundle: Bundle) -> Iterator[Omission]:
