@@ -53,6 +53,11 @@ def _refused(call: Callable[[], object]) -> str:
     return str(error.value)
 
 
+def test_readers_name_the_parameter_that_they_have() -> None:
+    with mcap_landmarks.open_log(resource("recordings", "demo_localize.mcap")) as log:
+        assert "the parameter topic needs" in _refused(lambda: log.odometry("/scan"))
+
+
 def test_errors_of_the_functions_are_told_so(tmp_path: Path) -> None:
     log = shutil.copy(resource("recordings", "demo_localize.mcap"), tmp_path / "log.mcap")
     out = tmp_path / "out.mcap"

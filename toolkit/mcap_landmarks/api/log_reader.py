@@ -36,6 +36,8 @@ from mcap_landmarks.structured import StructuredArray
 from mcap_landmarks.wording import counted
 
 _Inputs = Mapping[Connection, Channel[Message]]
+_TOPIC = {"image": "topic", "scan": "topic", "odom": "topic"}
+"""What chooses a topic of one kind in all verbs is called so where only that kind is read."""
 
 
 @naming_parameters()
@@ -134,7 +136,7 @@ class LogReader:
         found = self._messages(SCAN, topic)
         return (LoggedScan.of(log_ns, name, scan) for name, log_ns, scan in found if isinstance(scan, LaserScan))
 
-    @naming_parameters()
+    @naming_parameters(**_TOPIC)
     def clouds(self, topic: str | None = None) -> Iterator[LoggedCloud]:
         """The point clouds of a LiDAR or depth camera, one by one; raises as `images`."""
         self._check_open()
@@ -145,7 +147,7 @@ class LogReader:
         found = self._messages(SCAN, topics[0])
         return (LoggedCloud.of(log_ns, name, cloud) for name, log_ns, cloud in found if isinstance(cloud, PointCloud2))
 
-    @naming_parameters()
+    @naming_parameters(**_TOPIC)
     def odometry(self, topic: str | None = None) -> StructuredArray:
         """A row per message of odometry as it was recorded, in the plane, with the base's own velocity.
 
@@ -178,7 +180,7 @@ class LogReader:
         """A row per bundle: what came of localizing it, and which objects were matched; raises as `odometry`."""
         return log_tables.match_table(self._of(MATCH, topic))
 
-    @naming_parameters()
+    @naming_parameters(**_TOPIC)
     def poses(self, topic: str | None = None, child: str | None = None) -> StructuredArray:
         """A row per pose in the plane, by its stamp: of what localize found, else of what `export` would take.
 
@@ -220,7 +222,7 @@ class LogReader:
         log = RecordedLog(self._recording, replace(self._span, choice=choice))
         return log.layered([Layer(self._recording, self._recording.channels)])
 
-    @naming_parameters()
+    @naming_parameters(**_TOPIC)
     def _inputs(self, channel: Channel[Message], topic: str | None) -> tuple[LayeredLog, _Inputs]:
         """The connections that a channel is read from: those that the verbs would take, or those of a topic."""
         choice, role = self._span.choice, ROLES.get(channel)

@@ -201,7 +201,7 @@ class Job:
         if left_out and not declared:
             return "; ".join(one.told for one in left_out)
         if self.inputs.losses:
-            return f"no message can be read: {self.inputs.losses[0]}"
+            return f"no message can be read: {self.inputs.losses[0]}; copy it again"
         if declared and not is_cut:
             return f"none of {declared} declared messages can be read; copy it again"
         if declared:

@@ -102,7 +102,7 @@ def _recover_mcap(path: Path, target: Location, watch: Watch, *, overwrite: bool
 
 def _why_nothing(losses: tuple[str, ...]) -> str:
     if losses:
-        return f"no message can be recovered: {losses[0]}"
+        return f"no message can be recovered: {losses[0]}; copy it again"
     return "there are no messages in it; choose another log"
 
 
