@@ -30,3 +30,9 @@ def test_two_inputs_of_one_name_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="another input also writes"):
         output_files([Path("a/log.mcap"), Path("b/log.mcap")], tmp_path)
     assert output_files([Path("a/log.mcap")], tmp_path) == {Path("a/log.mcap"): tmp_path / "log.mcap"}
+
+
+@pytest.mark.parametrize("name", ["a.bag", "a.DB3"])
+def test_a_recording_is_not_called_a_bag(tmp_path: Path, name: str) -> None:
+    with pytest.raises(UsageError, match=r"is an MCAP file; name it a\.mcap"):
+        output_files([Path("log.mcap")], tmp_path / name)

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mcap_landmarks.atomic import check_target
 from mcap_landmarks.cli import options, scenarios
 from mcap_landmarks.cli.console import progress, say, say_json, table, warn
 from mcap_landmarks.errors import UsageError
 from mcap_landmarks.locations import Location, location
+from mcap_landmarks.runs.outputs import check_recording
 from mcap_landmarks.wording import counted
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def command(
         )
     from mcap_landmarks.runs.replacing import check_apart, generated_recording, output_to
 
-    target = check_target(output)
+    target = check_recording(output)
     check_apart([target], [file for file in [Path(scenario), world] if file is not None and not _is_missing(file)])
     staged = scenarios.staged_scenario(scenario, world, settings or [], seed)
     from mcap_landmarks_generator.record import manifest, record

@@ -39,10 +39,10 @@ def command(
 
     Ctrl-C and a terminal that is lost end the drive as q does: the recording is whole.
     """
-    from mcap_landmarks.atomic import check_target
+    from mcap_landmarks.runs.outputs import check_recording
     from mcap_landmarks.runs.replacing import new_files
 
-    target, look = check_target(output), _look_with(model)
+    target, look = check_recording(output), _look_with(model)
     with new_files([target], [world], overwrite=overwrite):
         check_terminal()
         staged = scenarios.staged_scenario(scenario, world, settings or [], seed)

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from mcap_landmarks.atomic import check_target
 from mcap_landmarks.errors import MessageError, UsageError
 from mcap_landmarks.inspection.open_logs import OpenLog
 from mcap_landmarks.locations import Location
 from mcap_landmarks.recording.chunk_form import ChunkForm
 from mcap_landmarks.recording.writer import ROS2, profile_of
-from mcap_landmarks.runs.outputs import make_folder, names_folder, output_files
+from mcap_landmarks.runs.outputs import BAGS, make_folder, names_folder
 from mcap_landmarks.runs.splitting import Split
 from mcap_landmarks.sources import ros1_type
 from mcap_landmarks.stage import Connection
@@ -38,7 +39,7 @@ class OutputForm:
 
 
 _SUFFIXES = {OutputFormat.MCAP: ".mcap", OutputFormat.BAG: ".bag"}
-_FILES = {".mcap", ".bag", ".db3"}
+_FILES = BAGS | {".mcap"}
 
 
 def refusal(to: OutputFormat, connection: Connection) -> str:
@@ -65,7 +66,7 @@ def planned(logs: Sequence[OpenLog], output: Location, form: OutputForm) -> dict
     several, own = len(logs) > len({log.path for log in logs}), _SUFFIXES.get(form.to, "")
     if output.suffix.lower() in _FILES and not (form.names_folder or names_folder(output)):
         _check_file(output, form, len(logs) if several else 1)
-        return {next(iter(output_files([output], output).values())): list(logs)}
+        return {check_target(output): list(logs)}
     if isinstance(output, Path) and output.exists() and not output.is_dir():
         raise UsageError(
             f"{output} is a file and no folder; give the output another name" + f", as NAME{own}" * bool(own)

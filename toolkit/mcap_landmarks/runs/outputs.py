@@ -8,10 +8,24 @@ from mcap_landmarks.atomic import check_target
 from mcap_landmarks.errors import RecordingError, UsageError
 from mcap_landmarks.locations import Location, Url
 
+BAGS = frozenset({".bag", ".db3"})
+"""Suffixes of what only `convert` makes."""
+
 
 def names_folder(output: Location) -> bool:
     """Whether an output is a folder: one that is there, or a URL with a slash at its end."""
     return output.text.endswith("/") if isinstance(output, Url) else isinstance(output, Path) and output.is_dir()
+
+
+def check_recording(target: Location) -> Location:
+    """The target of a recording, see `check_target`; nobody opens an MCAP file that is called a bag.
+
+    Raises:
+        UsageError: the name is that of a bag, or the target cannot be written.
+    """
+    if target.suffix.lower() in BAGS:
+        raise UsageError(f"{target}: the output is an MCAP file; name it {target.stem}.mcap")
+    return check_target(target)
 
 
 def output_files(inputs: Sequence[Location], output: Location) -> dict[Location, Location]:
@@ -20,10 +34,10 @@ def output_files(inputs: Sequence[Location], output: Location) -> dict[Location,
     The folder is made if its parent exists. A single input goes into `output` too if that is a folder.
 
     Raises:
-        UsageError: two inputs would write the same file, or the target cannot be written.
+        UsageError: two inputs would write the same file, the name is that of a bag, or the target cannot be written.
     """
     if len(inputs) == 1 and not names_folder(output):
-        return {inputs[0]: check_target(output)}
+        return {inputs[0]: check_recording(output)}
     folder = make_folder(output)
     files: dict[Location, Location] = {}
     for log in inputs:
