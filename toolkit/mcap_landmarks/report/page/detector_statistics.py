@@ -25,6 +25,8 @@ _BINS = np.linspace(0.0, 1.0, 21)
 Corners = tuple[float, float, float, float]
 Boxes = tuple[list[str], list[float], list[Corners]]
 """Of one image: class names of K boxes, their scores and corners (least x and y, greatest x and y)."""
+_Image = tuple[bytes, int]
+"""Frame and stamp: images of two cameras may have one stamp."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,14 +65,14 @@ def detector_statistics(recording: Recording) -> DetectorStatistics | None:
     scores: dict[str, list[float]] = defaultdict(list)
     images = empty = compared = 0
     judged, true, missed = Counter[str](), Counter[str](), Counter[str]()
-    for stamp_ns, found in _images(recording, DETECTIONS):
+    for image, found in _images(recording, DETECTIONS):
         images += 1
         empty += not found[0]
         for name, score in zip(found[0], found[1], strict=True):
             scores[name].append(score)
-        if stamp_ns in truth:
+        if image in truth:
             compared += 1
-            hits, left = _compared(found, truth[stamp_ns])
+            hits, left = _compared(found, truth[image])
             judged.update(found[0])
             true.update(hits)
             missed.update(left)
@@ -126,8 +128,8 @@ def _overlap(box: Corners, other: Corners) -> float:
     return shared / max(areas - shared, 1e-9)
 
 
-def _images(recording: Recording, channel: Channel[Message]) -> Iterator[tuple[int, Boxes]]:
-    """The stamp and the boxes of every message of a channel that can be read."""
+def _images(recording: Recording, channel: Channel[Message]) -> Iterator[tuple[_Image, Boxes]]:
+    """The image and the boxes of every message of a channel that can be read."""
     ros_type = channel.message.ROS_TYPE
     for connection in recording.connections(channel.topic):
         if connection.read_as != ros_type:
@@ -142,7 +144,7 @@ def _images(recording: Recording, channel: Channel[Message]) -> Iterator[tuple[i
         yield from _boxes(ros_type, schema, held)
 
 
-def _boxes(ros_type: str, schema: str, messages: list[bytes]) -> Iterator[tuple[int, Boxes]]:
+def _boxes(ros_type: str, schema: str, messages: list[bytes]) -> Iterator[tuple[_Image, Boxes]]:
     """Boxes without a class are left out; messages that cannot be decoded, too: evaluation counts what is lost."""
     if not messages:
         return
@@ -157,7 +159,7 @@ def _boxes(ros_type: str, schema: str, messages: list[bytes]) -> Iterator[tuple[
     yield from _boxes_of(table)
 
 
-def _boxes_of(table: Table) -> Iterator[tuple[int, Boxes]]:
+def _boxes_of(table: Table) -> Iterator[tuple[_Image, Boxes]]:
     counts, boxes = table.children["detections"]
     results, options = boxes.children["results"]
     first = np.cumsum(results) - results
@@ -172,8 +174,8 @@ def _boxes_of(table: Table) -> Iterator[tuple[int, Boxes]]:
     half_sides = np.hstack([boxes.columns[f"bbox.size_{axis}"].values for axis in "xy"]) / 2
     corners = [tuple(row) for row in np.hstack([middle - half_sides, middle + half_sides]).tolist()]
     ends = np.cumsum(counts)
-    stamps = table.columns["header.stamp"].values[:, 0]
+    frames, stamps = (table.columns[f"header.{name}"].values[:, 0].tolist() for name in ("frame_id", "stamp"))
     every = list(zip(names.tolist(), scores.tolist(), corners, strict=True))
-    for stamp_ns, start, end in zip(stamps.tolist(), (ends - counts).tolist(), ends.tolist(), strict=True):
+    for *image, start, end in zip(frames, stamps, (ends - counts).tolist(), ends.tolist(), strict=True):
         kept = [box for box, has_class in zip(every[start:end], classed[start:end], strict=True) if has_class]
-        yield stamp_ns, ([box[0] for box in kept], [box[1] for box in kept], [box[2] for box in kept])
+        yield (image[0], image[1]), ([box[0] for box in kept], [box[1] for box in kept], [box[2] for box in kept])
